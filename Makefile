@@ -1,0 +1,92 @@
+# dreammat: make help
+
+PYTHON ?= python3
+VENV   ?= .venv
+RUN    := $(VENV)/bin
+DREAMMAT := $(RUN)/dreammat
+
+# one job: make asset MESH=chair.obj PROMPT="a carved oak chair" OUT=assets/chair
+MESH   ?=
+PROMPT ?=
+NAME   ?= $(basename $(notdir $(MESH)))
+OUT    ?= assets/$(NAME)
+# a folder of jobs, each a folder with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
+JOBS   ?= jobs
+
+# options of each stage, to override on the command line
+PREP_OPTIONS       ?=
+CONDITIONS_OPTIONS ?=
+DISTILL_OPTIONS    ?=
+BAKE_OPTIONS       ?=
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: help setup demo test lint asset batch bench clean
+
+help:  ## show this list
+	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(VENV)/.ready  ## make the virtual environment and install everything into it
+
+$(VENV)/.ready: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "dreammat needs Python 3.10 or newer")'
+	$(PYTHON) -m venv $(VENV)
+	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,report]'
+	@touch $@
+
+# ------------------------------------------------------------------- the stages, one pattern rule each
+# NAME/mesh.* and NAME/prompt.txt -> prep.npz -> conditions/ -> material.npz -> asset/
+# `prep` always runs: it hashes the mesh, and leaves prep.npz untouched when that is up to date.
+
+MESHES = obj glb gltf ply stl off
+
+%/prep.npz: FORCE | $(VENV)/.ready
+	@mesh=$$(cat '$*/mesh.path' 2>/dev/null || ls $(foreach type,$(MESHES),'$*'/*.$(type)) 2>/dev/null | head -n 1); \
+	[ -n "$$mesh" ] || { echo "$*: no mesh there ($(MESHES))" >&2; exit 1; }; \
+	$(DREAMMAT) prep "$$mesh" -o $@ $(PREP_OPTIONS)
+
+%/conditions/manifest.json: %/prep.npz
+	$(DREAMMAT) conditions $< -o $(@D) $(CONDITIONS_OPTIONS)
+	@touch $@
+
+%/material.npz: %/conditions/manifest.json %/prompt.txt
+	$(DREAMMAT) distill $(<D) --prompt "$$(cat $*/prompt.txt)" -o $@ $(DISTILL_OPTIONS)
+	@touch $@
+
+%/asset/bake.json: %/prep.npz %/material.npz
+	$(DREAMMAT) bake $^ -o $(@D) $(BAKE_OPTIONS)
+	@touch $@
+
+.PHONY: FORCE
+FORCE:
+
+# ------------------------------------------------------------------------------------------ what people type
+
+demo: $(VENV)/.ready  ## texture a mesh made by the project itself, from nothing to demo/asset
+	$(RUN)/python examples/urn.py demo/urn.obj
+	@printf 'weathered copper' > demo/prompt.txt
+	$(MAKE) demo/asset/bake.json CONDITIONS_OPTIONS='--views 32' DISTILL_OPTIONS='--steps 400'
+	@echo "look at demo/asset/preview.png; the model is demo/asset/model.glb"
+
+asset: $(VENV)/.ready  ## one mesh and prompt: make asset MESH=chair.obj PROMPT="a carved oak chair"
+	@[ -n "$(MESH)" ] && [ -n "$(PROMPT)" ] || { echo 'usage: make asset MESH=chair.obj PROMPT="a carved oak chair"' >&2; exit 2; }
+	@mkdir -p "$(OUT)"
+	@printf '%s' "$(PROMPT)" | cmp -s - "$(OUT)/prompt.txt" || printf '%s' "$(PROMPT)" > "$(OUT)/prompt.txt"
+	@printf '%s' "$(MESH)" | cmp -s - "$(OUT)/mesh.path" || printf '%s' "$(MESH)" > "$(OUT)/mesh.path"
+	$(MAKE) "$(OUT)/asset/bake.json"
+
+batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
+	$(MAKE) $(patsubst %/prompt.txt,%/asset/bake.json,$(wildcard $(JOBS)/*/prompt.txt))
+
+test: $(VENV)/.ready  ## all tests
+	$(RUN)/python -m pytest -q
+
+lint: $(VENV)/.ready  ## ruff and mypy
+	$(RUN)/ruff check .
+	$(RUN)/mypy
+
+bench: demo/prep.npz  ## speed against error of the light transport
+	$(DREAMMAT) report conditions demo/prep.npz -o bench
+
+clean:  ## remove the virtual environment and the demo
+	rm -rf $(VENV) demo

@@ -1,0 +1,40 @@
+"""dreammat bake"""
+
+from pathlib import Path
+
+import click
+
+from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from stages.bake.options import SIZES, BakeOptions
+
+DEFAULT = defaults(BakeOptions)
+
+
+@click.command()
+@click.argument("prep", type=INPUT, metavar="PREP.npz")
+@click.argument("material", type=INPUT, metavar="MATERIAL.npz")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="The asset folder to write.")
+@click.option("--size", type=click.Choice(SIZES), default=DEFAULT["size"], show_default=True, metavar="TEXELS",
+              help=f"Texture size: {', '.join(map(str, SIZES))}.")
+@click.option("--supersample", type=click.IntRange(1, 8), default=DEFAULT["supersample"], show_default=True,
+              metavar="N", help="N x N samples in each texel.")
+@click.option("--preview-size", type=click.IntRange(32, 2048), default=DEFAULT["preview_size"], show_default=True,
+              metavar="PIXELS", help="Side of each view in preview.png.")
+@common_options
+def command(prep: Path, material: Path, output: Path, common: Common, **chosen: object) -> None:
+    """Write textures (EXR and PNG), model.glb and a preview of PREP.npz with the material of MATERIAL.npz.
+
+    The model has the source's own vertices, faces, UVs and frame; charts were made only where the source's UVs cannot
+    be baked.
+    """
+    options = BakeOptions(**chosen)  # type: ignore[arg-type]
+    if plan(common, "bake", output, options):
+        return
+    from stages.bake.stage import bake
+
+    with reporter(common) as progress:
+        result = bake(prep, material, output, options, common.force, progress)
+    data = {"output": str(output), "up_to_date": result.up_to_date, "files": result.files, "report": result.report}
+    facts = {key: value for key, value in result.report.items() if isinstance(value, int | float | str)}
+    state = ": up to date" if result.up_to_date else ""
+    show(common, data, [f"{output}{state}", *([] if result.up_to_date else lines_of(facts))])

@@ -1,0 +1,141 @@
+"""What every command shares: its common options, progress on the terminal, and how a result is shown.
+
+Messages and progress go to stderr, results to stdout. On a terminal progress is a bar with rate and time left;
+elsewhere it is a plain line now and then. NO_COLOR is honoured.
+"""
+
+import dataclasses
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, Task, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
+from rich.text import Text
+
+from stages.core.progress import Progress, silent
+
+LINE_EVERY = 15.0
+"""Seconds between progress lines where stderr is not a terminal."""
+
+INPUT = click.Path(path_type=Path)
+"""A path to read; whether it can be read is the stage's to say, in its own words."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Common:
+    """The options that every command has."""
+
+    force: bool
+    quiet: bool
+    verbose: bool
+    as_json: bool
+    dry_run: bool
+
+
+def common_options(function: Callable) -> Callable:
+    """Add --force, --quiet, --verbose, --json and --dry-run, and pass them on as one `Common`."""
+
+    def call(force: bool, quiet: bool, verbose: bool, as_json: bool, dry_run: bool, **rest: Any) -> Any:
+        return function(common=Common(force, quiet, verbose, as_json, dry_run), **rest)
+
+    call.__doc__, call.__name__ = function.__doc__, function.__name__
+    call.__click_params__ = list(getattr(function, "__click_params__", []))  # type: ignore[attr-defined]
+    for option in reversed(
+        [
+            click.option("-f", "--force", is_flag=True, help="Redo the work even if the output is up to date."),
+            click.option("-q", "--quiet", is_flag=True, help="Only errors."),
+            click.option("-v", "--verbose", is_flag=True, help="More of what is found and done."),
+            click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout."),
+            click.option("--dry-run", is_flag=True, help="Say what would be done, and stop."),
+        ]
+    ):
+        call = option(call)
+    return call
+
+
+def defaults(options: type) -> dict[str, Any]:
+    """The defaults of an options dataclass, so that the command line has none of its own."""
+    return {field.name: field.default for field in dataclasses.fields(options)}
+
+
+def plan(common: Common, verb: str, output: Path, options: Any) -> bool:
+    """For --dry-run: print the plan. Returns: whether to stop here."""
+    if common.dry_run:
+        chosen = dataclasses.asdict(options)
+        show(common, {"would": verb, "output": str(output), **chosen}, [f"would {verb} {output}", *lines_of(chosen)])
+    return common.dry_run
+
+
+def lines_of(values: dict[str, Any]) -> list[str]:
+    """One aligned line for each entry."""
+    width = max(map(len, values), default=0)
+    return [f"  {key.replace('_', ' '):{width}}  {value}" for key, value in values.items()]
+
+
+def show(common: Common, data: dict[str, Any], lines: list[str]) -> None:
+    """Print a result: JSON on stdout with --json, lines on stdout otherwise, nothing with --quiet."""
+    if common.as_json:
+        click.echo(json.dumps(data, default=str))
+    elif not common.quiet:
+        for line in lines:
+            click.echo(line)
+
+
+class Rate(ProgressColumn):
+    """Units a second, or seconds a unit when slow."""
+
+    def render(self, task: Task) -> Text:
+        speed = task.finished_speed or task.speed
+        if not speed:
+            return Text("")
+        return Text(f"{speed:.1f}/s" if speed >= 1 else f"{1 / speed:.1f} s each", style="dim")
+
+
+class reporter:
+    """Context manager that gives a stage its `Progress`: a bar on a terminal, lines elsewhere, nothing when quiet."""
+
+    def __init__(self, common: Common) -> None:
+        self.common = common
+        self.bar: Bar | None = None
+        self.tasks: dict[str, Any] = {}
+        self.started: dict[str, float] = {}
+        self.told = time.monotonic()
+
+    def __enter__(self) -> Progress:
+        if self.common.quiet:
+            return silent
+        if not sys.stderr.isatty():
+            return self.line
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
+        self.bar = Bar(*columns, console=Console(stderr=True), transient=True)
+        self.bar.start()
+        return self.draw
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar:
+            self.bar.stop()
+
+    def draw(self, what: str, done: int, total: int) -> None:
+        """Progress on a terminal."""
+        assert self.bar is not None
+        label = what.split(":")[0]
+        if label not in self.tasks:
+            self.tasks[label] = self.bar.add_task(what, total=total or None)
+        self.bar.update(self.tasks[label], description=what, completed=done, total=total or None)
+
+    def line(self, what: str, done: int, total: int) -> None:
+        """Progress in a log: one line at most every LINE_EVERY seconds."""
+        now = time.monotonic()
+        start = self.started.setdefault(what.split(":")[0], now)
+        if now - self.told < LINE_EVERY:
+            return
+        self.told = now
+        left = f", {(now - start) / done * (total - done):.0f} s left" if 0 < done < total else ""
+        count = f" {done}/{total}" if total else ""
+        click.echo(f"{what}{count}{left}", err=True)

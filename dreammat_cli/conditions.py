@@ -1,0 +1,61 @@
+"""dreammat conditions"""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from stages.conditions.options import ConditionsOptions
+
+DEFAULT = defaults(ConditionsOptions)
+
+
+@click.command()
+@click.argument("prep", type=INPUT, metavar="PREP.npz")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="The conditions folder to write.")
+@click.option("--views", type=click.IntRange(1, 9999), default=DEFAULT["views"], show_default=True, help="Cameras.")
+@click.option("--size", type=click.IntRange(16, 4096), default=DEFAULT["size"], show_default=True, metavar="PIXELS",
+              help="Side of a view; 512 for Stable Diffusion.")
+@click.option("--env", multiple=True, metavar="NAME|FILE",
+              help="An environment: a built-in name (clear_sky, overcast, studio, interior, night) or a "
+                   "latitude-longitude .hdr or .exr file. Repeat for more.  [default: the five built-in ones]")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=DEFAULT["seed"], show_default=True,
+              help="Of cameras and rays.")
+@click.option("--quality", type=click.Choice(["draft", "standard", "high"]), default=DEFAULT["quality"],
+              show_default=True, help="Rays a point.")
+@click.option("--fov", type=(click.FloatRange(1, 120),) * 2, default=DEFAULT["fov"], show_default=True,
+              metavar="LOW HIGH", help="Vertical field of view, degrees.")
+@click.option("--elevation", type=(click.FloatRange(-89, 89),) * 2, default=DEFAULT["elevation"], show_default=True,
+              metavar="LOW HIGH", help="Camera elevation, degrees.")
+@click.option("--frame", type=(click.FloatRange(0.05, 1),) * 2, default=DEFAULT["frame"], show_default=True,
+              metavar="LOW HIGH", help="Share of the half-frame that the object reaches.")
+@click.option("--maps", is_flag=True, help="Also write maps_<environment>.exr for every view.")
+@common_options
+def command(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
+    """Ray-trace depth, normals and light transport around the mesh of PREP.npz.
+
+    An interrupted run continues with the views that are missing.
+    """
+    for name in ("fov", "elevation", "frame"):
+        low, high = chosen[name]
+        if low > high:
+            raise click.BadParameter(f"{low:g} {high:g}: expected LOW <= HIGH", param_hint=f"--{name}")
+    options = ConditionsOptions(**chosen)
+    if plan(common, "trace conditions into", output, options):
+        return
+    from stages.conditions.stage import conditions
+
+    with reporter(common) as progress:
+        result = conditions(prep, output, options, common.force, progress)
+    if result.up_to_date:
+        show(common, {"output": str(output), "up_to_date": True}, [f"{output}: up to date"])
+        return
+    mended = {name: count for name, count in result.clamped.items() if count}
+    facts = {
+        "views": f"{result.made} made, {result.found} found",
+        "environments": ", ".join(result.environments),
+        **({"mended texels": ", ".join(f"{n} {c}" for n, c in mended.items())} if mended else {}),
+    }
+    data = {"output": str(output), "made": result.made, "found": result.found, "clamped": result.clamped}
+    show(common, data, [str(output), *lines_of(facts)])

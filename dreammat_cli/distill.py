@@ -1,0 +1,63 @@
+"""dreammat distill"""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from stages.distill.options import DistillOptions
+
+DEFAULT = defaults(DistillOptions)
+UNIT = click.FloatRange(0)
+
+
+def weight(name: str, text: str) -> Any:
+    """A non-negative weight that takes its default from the stage."""
+    flag = "--" + name.replace("_", "-")
+    return click.option(flag, type=UNIT, default=DEFAULT[name], show_default=True, metavar="X", help=text)
+
+
+@click.command()
+@click.argument("conditions", type=INPUT, metavar="CONDITIONS")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="MATERIAL.npz", help="The file to write.")
+@click.option("--prompt", default=DEFAULT["prompt"], metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
+@click.option("--negative-prompt", default=DEFAULT["negative_prompt"], show_default=True, metavar="TEXT",
+              help="What the picture should not look like.")
+@click.option("--guidance", type=click.Choice(["prior", "reference"]), default=DEFAULT["guidance"], show_default=True,
+              help="The embedded diffusion model, or the known material of --reference.")
+@click.option("--reference", type=INPUT, default=DEFAULT["reference"], metavar="MODEL.glb",
+              help="A textured model of the same shape, for --guidance reference.")
+@click.option("--steps", type=click.IntRange(1), default=DEFAULT["steps"], show_default=True, metavar="N",
+              help="Optimiser steps.")
+@click.option("--batch", type=click.IntRange(1, 256), default=DEFAULT["batch"], show_default=True, metavar="N",
+              help="Images a step.")
+@click.option("--learning-rate", type=click.FloatRange(0, 1, min_open=True), default=DEFAULT["learning_rate"],
+              show_default=True, metavar="X", help="Of Adam, at the start.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=DEFAULT["seed"], show_default=True,
+              help="Same seed, same result.")
+@click.option("--device", default=DEFAULT["device"], show_default=True, help="A torch device: cpu, cuda, mps.")
+@weight("smoothness", "Weight of the difference between neighbouring points' materials.")
+@weight("eta1", "Weight of the positive prediction (paper, Eq. 7).")
+@weight("eta2_start", "Weight of the negative prediction at the first step.")
+@weight("eta2_end", "And from two thirds of the steps on.")
+@weight("posterior", "Share of the posterior-mean term; 0 is the paper's pure classifier score.")
+@weight("bimodal", "How strongly metallic is sent to 0 or 1 towards the end.")
+@common_options
+def command(conditions: Path, output: Path, common: Common, **chosen: Any) -> None:
+    """Optimise the material of the mesh in the folder CONDITIONS until it looks like --prompt in every light.
+
+    Stopped by Ctrl-C or a kill, the same command continues; on a CPU the result has the same bytes either way.
+    """
+    options = DistillOptions(**chosen)
+    if plan(common, "distill", output, options):
+        return
+    from stages.distill.stage import distill
+
+    with reporter(common) as progress:
+        result = distill(conditions, output, options, common.force, progress)
+    if result.up_to_date:
+        show(common, {"output": str(output), "up_to_date": True}, [f"{output}: up to date"])
+        return
+    facts = {"steps": result.steps, "resumed at": result.resumed, "loss": round(result.loss, 6)}
+    show(common, {"output": str(output), **facts}, [str(output), *lines_of(facts)])

@@ -1,0 +1,88 @@
+"""The `dreammat` command. Each subcommand lives in a file of its own and is imported only when it is called."""
+
+import importlib
+import os
+import signal
+import sys
+from importlib.metadata import version
+
+import click
+
+from stages.core.errors import DreammatError
+
+COMMANDS = {
+    "prep": "Read, check, mend and unwrap a mesh.",
+    "conditions": "Ray-trace geometry and light around the mesh.",
+    "distill": "Optimise the material for a prompt.",
+    "bake": "Write textures and a model with the material.",
+    "report": "Measure speed against error.",
+    "train": "Train the diffusion models.",
+}
+
+INTERRUPTED = 130
+
+
+class LazyGroup(click.Group):
+    """Imports a subcommand's module when it is called, so that --help is instant."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        return importlib.import_module(f"dreammat_cli.{name}").command
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(version("dreammat"), prog_name="dreammat")
+def cli() -> None:
+    """Physically based materials for untextured meshes, from a text prompt.
+
+    \b
+    dreammat prep       MESH                        -o PREP.npz
+    dreammat conditions PREP.npz                    -o CONDITIONS/
+    dreammat distill    CONDITIONS/ --prompt TEXT   -o MATERIAL.npz
+    dreammat bake       PREP.npz MATERIAL.npz       -o ASSET/
+
+    Every command can be stopped and run again: it continues, or says that its output is up to date.
+
+    \b
+    Exit codes: 0 done, 2 wrong usage, 3 unusable input file, 4 missing, damaged or
+    foreign artefact, 5 output cannot be written, 6 not finite, 130 interrupted.
+    """
+
+
+def main() -> None:
+    """Entry point: errors become one line and an exit code; SIGTERM ends like Ctrl-C, in a state that resumes."""
+    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    try:
+        cli(standalone_mode=False)
+    except DreammatError as error:
+        fail(str(error), error.exit_code)
+    except click.exceptions.Exit as error:
+        sys.exit(error.exit_code)
+    except click.exceptions.NoArgsIsHelpError as error:
+        click.echo(error.format_message())
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else "dreammat"
+        fail(f"{error.format_message().rstrip('.')}; see {command} --help", error.exit_code)
+    except click.ClickException as error:
+        fail(error.format_message(), error.exit_code)
+    except (KeyboardInterrupt, click.Abort):
+        fail("interrupted; the same command continues where it stopped", INTERRUPTED)
+    except MemoryError:
+        fail("out of memory; try fewer or smaller views, a smaller texture, or a simpler mesh", 5)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def fail(message: str, code: int) -> None:
+    """Print one line to stderr and exit."""
+    click.echo(click.style("error: ", fg="red") + " ".join(message.split()), err=True)
+    sys.exit(code)

@@ -1,0 +1,47 @@
+"""dreammat prep"""
+
+from pathlib import Path
+
+import click
+
+from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from stages.prep.options import PrepOptions
+
+DEFAULT = defaults(PrepOptions)
+
+
+@click.command()
+@click.argument("mesh", type=INPUT, metavar="MESH")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="PREP.npz", help="The file to write.")
+@click.option("--up", type=click.Choice(["y", "z"]), default=DEFAULT["up"], show_default=True,
+              help="The source's up axis: y with front +z, or z with front -y (Blender).")
+@click.option("--texture-size", type=click.IntRange(64, 16384), default=DEFAULT["texture_size"], show_default=True,
+              metavar="TEXELS", help="Texture size that new UVs are laid out for.")
+@click.option("--padding", type=click.IntRange(0, 256), default=DEFAULT["padding"], show_default=True, metavar="TEXELS",
+              help="Padding around each chart; charts stand twice this apart.")
+@click.option("--crease-angle", type=click.FloatRange(0, 180), default=DEFAULT["crease_angle"], show_default=True,
+              metavar="DEGREES", help="A sharper edge stays sharp where the file has no usable normals.")
+@click.option("--weld-tolerance", type=click.FloatRange(0, 0.1), default=DEFAULT["weld_tolerance"], show_default=True,
+              metavar="DIAGONALS", help="Vertices closer than this are one.")
+@click.option("--uv", type=click.Choice(["auto", "keep", "new"]), default=DEFAULT["uv"], show_default=True,
+              help="Keep the source's UVs where they can be baked, insist on them, or always make new ones.")
+@click.option("--unwrap-seconds", type=click.FloatRange(0), default=DEFAULT["unwrap_seconds"], show_default=True,
+              metavar="SECONDS", help="Time that xatlas may take before simpler charts are made.")
+@click.option("--unwrap-triangles", type=click.IntRange(0), default=DEFAULT["unwrap_triangles"], show_default=True,
+              metavar="N", help="A larger mesh does not try xatlas.")
+@common_options
+def command(mesh: Path, output: Path, common: Common, **chosen: object) -> None:
+    """Read, check, mend, orient and unwrap MESH (.obj .ply .stl .off .glb .gltf).
+
+    The source's vertices, faces, UVs and frame are kept beside the working mesh, for `bake` to give back.
+    """
+    options = PrepOptions(**chosen)  # type: ignore[arg-type]
+    if plan(common, "prepare", output, options):
+        return
+    from stages.prep.stage import prep
+
+    with reporter(common) as progress:
+        result = prep(mesh, output, options, common.force, progress)
+    data = {"output": str(output), "up_to_date": result.up_to_date, "findings": result.findings}
+    state = ": up to date" if result.up_to_date else ""
+    show(common, data, [f"{output}{state}", *([] if result.up_to_date else lines_of(result.findings))])

@@ -1,0 +1,107 @@
+"""Fast evaluation of the material field, for inference only.
+
+Texels are visited row by row, so neighbouring points mostly share their cells of the coarser grids: a cell's corners
+are fetched once and kept until a point leaves it, and the network runs in the same pass, out of the processor's cache.
+`MaterialField.forward` is the plain form of the same; a test holds the two together.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.bake.jit import compiled, in_parallel
+from stages.core.field import HASH_PRIMES, OUTPUTS, MaterialField
+
+BLOCK = 256
+"""Points that go through the network at a time."""
+
+TASK = 1 << 18
+"""Points of one thread's task."""
+
+PRIME_Y, PRIME_Z = np.uint32(HASH_PRIMES[1]), np.uint32(HASH_PRIMES[2])
+
+
+def evaluate(field: MaterialField, points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Material of world points.
+
+    Args:
+        points: (N, 3).
+    Returns:
+        (N, 5) in [0, 1]: red, green and blue of the linear albedo, roughness, metallic.
+    """
+    arrays, layout = field.to_arrays(), field.config.layout()
+    w0, b0, w1, b1 = (arrays[name] for name in ("weights_0", "bias_0", "weights_1", "bias_1"))
+    result = np.empty((len(points), OUTPUTS), np.float32)
+
+    def part(start: int) -> None:
+        rows = slice(start, start + TASK)
+        _evaluate(points[rows], arrays["table"], layout, w0, b0, w1, b1, result[rows])
+
+    in_parallel(part, range(0, len(points), TASK))
+    return result
+
+
+@compiled
+def _evaluate(points, table, layout, w0, b0, w1, b1, result):  # type: ignore[no-untyped-def]
+    features = np.empty((w0.shape[1], len(points)), np.float32)
+    for level in range(len(layout)):  # all points of one level first: its part of the table stays in the cache
+        resolution, first, entries = layout[level]
+        _encode_level(points, table, resolution, first, entries, features[2 * level : 2 * level + 2])
+    hidden, outputs = np.empty(BLOCK, np.float32), np.empty((w1.shape[0], BLOCK), np.float32)
+    for start in range(0, len(points), BLOCK):
+        count = min(BLOCK, len(points) - start)
+        _network(features[:, start : start + count], w0, b0, w1, b1, hidden[:count], outputs)
+        for i in range(count):
+            for o in range(len(outputs)):
+                result[start + i, o] = np.float32(1) / (np.float32(1) + np.exp(-outputs[o, i]))
+
+
+@compiled
+def _encode_level(points, table, resolution, first, entries, features):  # type: ignore[no-untyped-def]
+    """Trilinear features of one level into `features` (2, N); see `stages.core.field.encode_reference`."""
+    corners = np.empty((8, 2), np.float32)
+    side = resolution + 1
+    direct = side * side * side <= entries
+    cell_x, cell_y, cell_z = -1, -1, -1
+    one, half, scale = np.float32(1), np.float32(0.5), np.float32(resolution)
+    for i in range(len(points)):
+        px = min(max(points[i, 0] + half, np.float32(0)), one) * scale
+        py = min(max(points[i, 1] + half, np.float32(0)), one) * scale
+        pz = min(max(points[i, 2] + half, np.float32(0)), one) * scale
+        x, y, z = min(int(px), resolution - 1), min(int(py), resolution - 1), min(int(pz), resolution - 1)
+        if x != cell_x or y != cell_y or z != cell_z:
+            cell_x, cell_y, cell_z = x, y, z
+            for c in range(8):
+                cx, cy, cz = x + (c & 1), y + ((c >> 1) & 1), z + (c >> 2)
+                if direct:
+                    row = first + cx + side * (cy + side * cz)
+                else:
+                    row = first + ((np.uint32(cx) ^ np.uint32(cy) * PRIME_Y ^ np.uint32(cz) * PRIME_Z) & (entries - 1))
+                corners[c, 0], corners[c, 1] = table[row, 0], table[row, 1]
+        fx, fy, fz = px - np.float32(x), py - np.float32(y), pz - np.float32(z)
+        gx, gy, gz = one - fx, one - fy, one - fz
+        for k in range(2):
+            near = gy * (gx * corners[0, k] + fx * corners[1, k]) + fy * (gx * corners[2, k] + fx * corners[3, k])
+            far = gy * (gx * corners[4, k] + fx * corners[5, k]) + fy * (gx * corners[6, k] + fx * corners[7, k])
+            features[k, i] = gz * near + fz * far
+
+
+@compiled
+def _network(features, w0, b0, w1, b1, hidden, outputs):  # type: ignore[no-untyped-def]
+    """One hidden layer, without the final sigmoids, on all points of a block at once: the inner loops are vectors.
+
+    features: (inputs, N), N up to BLOCK. w0, w1: (out, in). hidden: (N,) scratch. outputs: (5, BLOCK) result.
+    """
+    for o in range(len(w1)):
+        outputs[o] = b1[o]
+    for j in range(len(w0)):
+        hidden[:] = b0[j]
+        for i in range(w0.shape[1]):
+            weight = w0[j, i]
+            row = features[i]
+            for k in range(len(hidden)):
+                hidden[k] += weight * row[k]
+        for o in range(len(w1)):
+            weight = w1[o, j]
+            row = outputs[o]
+            for k in range(len(hidden)):
+                row[k] += weight * max(hidden[k], np.float32(0))

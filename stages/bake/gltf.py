@@ -1,0 +1,174 @@
+"""Writer of binary glTF 2.0: our own bytes, so that every position, index and UV is the very bits it was given.
+
+Source: Khronos glTF 2.0 specification, sections 3 (concepts) and 4 (GLB). Images are embedded PNG files.
+"""
+
+import importlib.metadata
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.bake.source import Model, Part
+from stages.core.artifact import written_atomically
+
+FLOAT, UINT16, UINT32 = 5126, 5123, 5125
+ARRAY, ELEMENTS = 34962, 34963
+CLAMP, LINEAR, TRILINEAR = 33071, 9729, 9987
+
+
+def generator() -> str:
+    """Program and version, for `asset.generator`."""
+    try:
+        return f"dreammat {importlib.metadata.version('dreammat')}"
+    except importlib.metadata.PackageNotFoundError:  # run from a source tree
+        return "dreammat"
+
+
+def write_glb(path: Path, model: Model, images: dict[str, bytes]) -> None:
+    """Write model.glb atomically.
+
+    Args:
+        images: PNG files by name: "albedo" (sRGB) and "orm" (linear: G roughness, B metallic), in this order.
+    """
+    buffer = _Buffer()
+    materials = list(dict.fromkeys(part.material for part in model.parts))
+    meshes, nodes, roots = _scene(model, materials, buffer)
+    document: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": generator()},
+        "scene": 0,
+        "scenes": [{"nodes": roots}],
+        "nodes": nodes,
+        "meshes": meshes,
+        "materials": [_material(name, model.double_sided) for name in materials],
+        "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
+        "samplers": [{"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": CLAMP, "wrapT": CLAMP}],
+        "images": [
+            {"name": name, "mimeType": "image/png", "bufferView": buffer.view(data)} for name, data in images.items()
+        ],
+    }
+    document |= {"accessors": buffer.accessors, "bufferViews": buffer.views, "buffers": [{"byteLength": buffer.length}]}
+    _write_chunks(path, document, buffer)
+
+
+class _Buffer:
+    """The binary chunk as it grows; equal data is stored once."""
+
+    def __init__(self) -> None:
+        self.pieces: list[bytes] = []
+        self.length = 0
+        self.views: list[dict[str, Any]] = []
+        self.accessors: list[dict[str, Any]] = []
+        self._known: dict[tuple[int, str, int], tuple[NDArray, int]] = {}
+
+    def view(self, data: bytes, target: int | None = None) -> int:
+        """Append bytes at a multiple of four. Returns: the index of their buffer view."""
+        view = {"buffer": 0, "byteOffset": self.length, "byteLength": len(data)}
+        self.views.append(view | ({"target": target} if target else {}))
+        padded = data + b"\0" * (-len(data) % 4)
+        self.pieces.append(padded)
+        self.length += len(padded)
+        return len(self.views) - 1
+
+    def accessor(self, array: NDArray, kind: str, target: int, bounds: bool = False) -> int:
+        """Store an array once. Args: kind: "SCALAR", "VEC2" or "VEC3". Returns: the index of its accessor."""
+        key = (id(array), kind, target)
+        if key not in self._known:  # the array is kept, so that its id stays its own
+            component = {"f4": FLOAT, "u2": UINT16, "u4": UINT32}[array.dtype.str[1:]]
+            data = array.astype(array.dtype.newbyteorder("<")).tobytes()
+            entry: dict[str, Any] = {"bufferView": self.view(data, target), "componentType": component}
+            entry |= {"count": len(array), "type": kind}
+            if bounds:
+                entry |= {"min": array.min(0).astype(float).tolist(), "max": array.max(0).astype(float).tolist()}
+            self.accessors.append(entry)
+            self._known[key] = (array, len(self.accessors) - 1)
+        return self._known[key][1]
+
+
+def _scene(model: Model, materials: list[str], buffer: _Buffer) -> tuple[list[dict], list[dict], list[int]]:
+    """Meshes, nodes and the indices of the root nodes: a node and a mesh for each run of parts on one node."""
+    meshes: list[dict[str, Any]] = []
+    nodes: list[dict[str, Any]] = []
+    roots: list[int] = []
+    previous: Part | None = None
+    for part in model.parts:
+        if previous is None or not _same_node(previous, part):
+            meshes.append({"name": part.name, "primitives": []})
+            roots.append(_add_node(nodes, part, len(meshes) - 1))
+        meshes[-1]["primitives"].append(_primitive(part, materials, buffer))
+        previous = part
+    if not np.array_equal(model.upright, np.eye(4)):
+        nodes.append({"name": "upright", "children": roots, "matrix": _columns(model.upright)})
+        roots = [len(nodes) - 1]
+    return meshes, nodes, roots
+
+
+def _same_node(a: Part, b: Part) -> bool:
+    return (a.node, a.name) == (b.node, b.name) and np.array_equal(a.transform, b.transform)
+
+
+def _add_node(nodes: list[dict[str, Any]], part: Part, mesh: int) -> int:
+    """Add the node of a part. Returns: its index.
+
+    A glTF matrix must be a translation, rotation and scale. One that also shears, which a tree of nodes can make, is
+    written as two nested nodes by its singular values: rotation, scale, rotation.
+    """
+    node: dict[str, Any] = {"name": part.node, "mesh": mesh}
+    if np.array_equal(part.transform, np.eye(4)):
+        nodes.append(node)
+    elif not shears(part.transform):
+        nodes.append(node | {"matrix": _columns(part.transform)})
+    else:
+        u, s, vt = np.linalg.svd(part.transform[:3, :3])
+        inner, outer = np.eye(4), part.transform.copy()
+        inner[:3, :3], outer[:3, :3] = vt, u * s
+        nodes.append(node | {"matrix": _columns(inner)})
+        nodes.append({"name": f"{part.node} (shear)", "children": [len(nodes) - 1], "matrix": _columns(outer)})
+    return len(nodes) - 1
+
+
+def shears(transform: NDArray[np.float64]) -> bool:
+    """Whether the axes of an affine (4, 4) matrix are not at right angles."""
+    axes = transform[:3, :3].T
+    length = np.linalg.norm(axes, axis=1)
+    gram = (axes @ axes.T) / np.where(length > 0, length, 1)[:, None] / np.where(length > 0, length, 1)
+    return bool((np.abs(gram - np.diag(np.diag(gram))) > 1e-6).any())
+
+
+def _columns(matrix: NDArray[np.float64]) -> list[float]:
+    """A matrix in glTF's order, column by column."""
+    return matrix.T.reshape(-1).tolist()
+
+
+def _primitive(part: Part, materials: list[str], buffer: _Buffer) -> dict[str, Any]:
+    attributes = {"POSITION": buffer.accessor(part.positions, "VEC3", ARRAY, bounds=True)}
+    if part.normals is not None:
+        attributes["NORMAL"] = buffer.accessor(part.normals, "VEC3", ARRAY)
+    attributes["TEXCOORD_0"] = buffer.accessor(part.uv, "VEC2", ARRAY)
+    small = len(part.positions) <= 65535  # the index 65535 itself means "restart"
+    indices = part.triangles.reshape(-1).astype(np.uint16 if small else np.uint32)
+    return {
+        "attributes": attributes,
+        "indices": buffer.accessor(indices, "SCALAR", ELEMENTS),
+        "material": materials.index(part.material),
+    }
+
+
+def _material(name: str, double_sided: bool) -> dict[str, Any]:
+    textures = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}
+    sides = {"doubleSided": True} if double_sided else {}
+    return {"name": name or "material", "pbrMetallicRoughness": textures, **sides}
+
+
+def _write_chunks(path: Path, document: dict[str, Any], buffer: _Buffer) -> None:
+    text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    with written_atomically(path) as temporary, open(temporary, "wb") as stream:
+        stream.write(struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + buffer.length))
+        stream.write(struct.pack("<I4s", len(text), b"JSON") + text)
+        stream.write(struct.pack("<I4s", buffer.length, b"BIN\0"))
+        for piece in buffer.pieces:
+            stream.write(piece)

@@ -1,0 +1,26 @@
+"""Options of the bake stage; imports nothing heavy, so that the command line can show its help at once."""
+
+from dataclasses import dataclass
+
+from stages.core.errors import InputError
+
+SIZES = (512, 1024, 2048, 4096, 8192)
+"""Texture sizes that can be baked, texels along each edge."""
+
+
+@dataclass(frozen=True)
+class BakeOptions:
+    """How textures are baked."""
+
+    size: int = 2048  # texels along each edge, one of SIZES
+    supersample: int = 2  # field samples along each edge of a texel, averaged: 2 means 4 samples
+    preview_size: int = 320  # pixels along each edge of one view of preview.png
+
+    def __post_init__(self) -> None:
+        """Raises: InputError that names the option, what was found and what is expected."""
+        if self.size not in SIZES:
+            raise InputError(f"size: {self.size} texels; expected one of {', '.join(map(str, SIZES))}")
+        if not 1 <= self.supersample <= 8:
+            raise InputError(f"supersample: {self.supersample}; expected 1 to 8 samples along each edge of a texel")
+        if not 32 <= self.preview_size <= 2048:
+            raise InputError(f"preview size: {self.preview_size} pixels; expected 32 to 2048")

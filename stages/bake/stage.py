@@ -1,0 +1,207 @@
+"""The bake stage: prep.npz and material.npz in, a folder with textures, models and a preview out."""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.bake.fill import fill_unseen, pad
+from stages.bake.gltf import write_glb
+from stages.bake.options import BakeOptions
+from stages.bake.preview import contact_sheet
+from stages.bake.raster import Layout, Surface, touched_texels
+from stages.bake.source import source_model
+from stages.bake.texels import bake_texels
+from stages.bake.textures import write_textures
+from stages.bake.visibility import Views, is_open, patches, seen_points
+from stages.bake.wavefront import write_obj
+from stages.core.artifact import (
+    Artifact,
+    Provenance,
+    expect_input,
+    load_npz,
+    peek,
+    plain_options,
+    read_manifest,
+    reason,
+    run_log,
+    sha256_file,
+    write_manifest,
+)
+from stages.core.errors import ArtifactError, OutputError
+from stages.core.field import MaterialField
+from stages.core.images import write_png
+from stages.core.progress import Progress, silent
+from stages.core.schemas import ASSET, MATERIAL, PREP
+from stages.light.scene import Scene
+
+
+@dataclass(frozen=True)
+class BakeResult:
+    """What was made. up_to_date: nothing had to be done. report: `extra` of bake.json."""
+
+    folder: Path
+    up_to_date: bool
+    files: list[str]
+    report: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The mesh, ready to trace and to bake.
+
+    open: whether the backs of its triangles can be seen. touched: (size, size) the surface point of each texel.
+    """
+
+    mesh: Artifact
+    scene: Scene
+    open: bool
+    layout: Layout
+    touched: Surface
+
+    @staticmethod
+    def of(prep: Path, mesh: Artifact, size: int) -> "Subject":
+        """From prep.npz. Raises: ArtifactError when no texel of the texture would show any surface."""
+        layout = Layout.of(mesh["uv"], size)
+        touched = touched_texels(layout)
+        if not (touched.triangle >= 0).any():
+            raise ArtifactError(f"{prep}: its UVs cover no texel of {size}; make it again with new UVs")
+        scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        return Subject(mesh, scene, is_open(mesh["triangles"]), layout, touched)
+
+    def points(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """World positions and interpolated normals of surface points, (N, 3) each."""
+        corners = self.mesh["vertices"][self.mesh["triangles"]]
+        return surface.interpolate(corners), surface.interpolate(self.mesh["normals"])
+
+
+def bake(
+    prep: Path,
+    material: Path,
+    out: Path,
+    options: BakeOptions,
+    force: bool = False,
+    progress: Progress = silent,
+) -> BakeResult:
+    """Bake the material of a mesh into textures and write the textured model.
+
+    Args:
+        prep, material: artefacts of the stages before; the material must be of this very mesh. out: folder.
+        force: bake even when the folder holds the result of the same request.
+    Raises: ArtifactError, OutputError.
+    """
+    mesh, made = load_npz(prep, PREP), load_npz(material, MATERIAL)
+    inputs = {"prep": sha256_file(prep), "material": sha256_file(material)}
+    expect_input(material, made.provenance, "prep", inputs["prep"], prep)
+    wanted = Provenance(plain_options(options), made.provenance.seed, inputs)
+    known = peek(out, ASSET)
+    if known and known.same_request(wanted) and not force:
+        return BakeResult(out, True, sorted(read_manifest(out, ASSET)[1]), known.extra)
+    field = material_field(material, made)
+    with run_log(out) as measured:
+        subject = Subject.of(prep, mesh, options.size)
+        open_folder(out)
+        maps, coverage = bake_maps(subject, made, field, options, progress)
+        files, notes = write_asset(out, subject, maps, options, progress)
+        report = {**describe(mesh, made), **coverage, **notes}
+        write_manifest(out, ASSET, Provenance(wanted.options, wanted.seed, inputs, report), files)
+        measured["texture_size"] = options.size
+    return BakeResult(out, False, sorted(files), report)
+
+
+def material_field(path: Path, made: Artifact) -> MaterialField:
+    """The field of material.npz. Raises: ArtifactError when header and arrays disagree."""
+    try:
+        return MaterialField.from_arrays(made.provenance.extra["field"], made.arrays)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtifactError(f"{path}: its field does not fit its header ({error}); distill it again") from error
+
+
+def open_folder(out: Path) -> None:
+    """Make the folder; where it holds an earlier asset, take that away, its manifest first. Raises: OutputError."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=out).close()
+        old = read_manifest(out, ASSET)[1] if peek(out, ASSET) else {}
+        (out / ASSET.manifest).unlink(missing_ok=True)
+        for name in old:
+            (out / Path(name).name).unlink(missing_ok=True)
+    except OSError as error:
+        raise OutputError(f"{out}: cannot be written: {reason(error)}; give a folder that can") from error
+
+
+def bake_maps(
+    subject: Subject, made: Artifact, field: MaterialField, options: BakeOptions, progress: Progress
+) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """Albedo, roughness and metallic of every texel, to the last one.
+
+    Returns:
+        (size, size, 5); the shares of texels on charts and, of these, that no view saw.
+    """
+    on_chart = subject.touched.triangle >= 0
+    corners = subject.mesh["vertices"][subject.mesh["triangles"]]
+    maps = bake_texels(field, corners, subject.layout, subject.touched, options.supersample, progress)
+    unseen = mend_unseen(subject, views_of(made), maps, progress)
+    progress("padding", 0, 1)
+    pad(maps, on_chart)
+    return maps, {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
+
+
+def mend_unseen(subject: Subject, views: Views, maps: NDArray[np.float32], progress: Progress) -> float:
+    """Fill, in place, the texels that no view saw from seen surface nearby; all stay when none was seen.
+
+    Args:
+        maps: (H, W, 5).
+    Returns:
+        the share of texels on charts that no view saw.
+    """
+    progress("visibility", 0, 1)
+    on_chart = subject.touched.triangle >= 0
+    surface, groups = subject.touched.where(on_chart), patches(subject.touched, subject.mesh["charts"])
+    first = surface[groups.first]
+    seen = seen_points(subject.scene, first, views, subject.open)
+    texel_seen = seen[groups.of_texel]
+    if seen.any() and not seen.all():
+        progress("filling", 0, 1)
+        values = maps[on_chart]
+        known, wanted = subject.points(first[seen]), subject.points(surface[~texel_seen])
+        values[~texel_seen] = fill_unseen(known, groups.mean(values)[seen], wanted)
+        maps[on_chart] = values
+    return float((~texel_seen).mean())
+
+
+def views_of(made: Artifact) -> Views:
+    """The views that distillation saw."""
+    width, height = made["size"].tolist()
+    return Views(made["c2w"], made["fov_y"], width, height)
+
+
+def write_asset(
+    out: Path, subject: Subject, maps: NDArray[np.float32], options: BakeOptions, progress: Progress
+) -> tuple[list[str], dict[str, int]]:
+    """Write textures, models and preview. Returns: the files' names; what the models could not hold."""
+    progress("files", 0, 1)
+    mesh, scene = subject.mesh, subject.scene
+    is_obj = mesh.provenance.extra["source_format"] == "obj"
+    files = write_textures(out, maps, grey=is_obj)
+    model = source_model(mesh, double_sided=subject.open)
+    write_glb(out / "model.glb", model, {name: (out / f"{name}.png").read_bytes() for name in ("albedo", "orm")})
+    files.append("model.glb")
+    if is_obj:
+        write_obj(out / "model.obj", mesh)
+        files += ["model.obj", "model.mtl"]
+    write_png(out / "preview.png", contact_sheet(scene, mesh["uv"], maps, options.preview_size, progress))
+    return [*files, "preview.png"], model.notes
+
+
+def describe(mesh: Artifact, made: Artifact) -> dict[str, Any]:
+    """What bake.json says of the inputs."""
+    source, material = mesh.provenance.extra, made.provenance.extra
+    return {
+        **{key: source[key] for key in ("source_name", "source_format", "uv_kept", "findings")},
+        **{key: material[key] for key in ("prompt", "guidance", "environments")},
+        "material_slots": list(dict.fromkeys(part["material"] for part in source["parts"])),
+    }

@@ -1,0 +1,27 @@
+"""What `dreammat conditions` can be told."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ConditionsOptions:
+    """Options of the conditions stage; ranges are (low, high)."""
+
+    views: int = 128
+    """cameras"""
+    size: int = 256
+    """pixels along each side of a view; 512 for Stable Diffusion"""
+    env: tuple[str, ...] = ()
+    """names of built-in environments or paths of .hdr and .exr files; empty for the five built-in ones"""
+    seed: int = 0
+    """of cameras and ray directions"""
+    quality: str = "standard"
+    """rays a point: draft, standard, high"""
+    fov: tuple[float, float] = (25.0, 45.0)
+    """vertical field of view, degrees"""
+    elevation: tuple[float, float] = (-20.0, 45.0)
+    """camera elevation, degrees"""
+    frame: tuple[float, float] = (0.6, 0.85)
+    """share of the half-frame that the object's farthest point reaches"""
+    maps: bool = False
+    """also write the condition maps of every view as maps_<environment>.exr"""

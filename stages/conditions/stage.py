@@ -1,0 +1,209 @@
+"""The conditions stage: cameras, environments, and the light transport of every view under each of them."""
+
+import dataclasses
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.conditions.cameras import Cameras, place_cameras
+from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
+from stages.conditions.options import ConditionsOptions
+from stages.core.artifact import (
+    MANIFEST,
+    Provenance,
+    load_npz,
+    peek,
+    plain_options,
+    read_json,
+    reason,
+    run_log,
+    save_npz,
+    sha256_file,
+    write_json,
+    write_manifest,
+)
+from stages.core.errors import InputError, NumericalError, OutputError
+from stages.core.progress import Progress, silent
+from stages.core.schemas import CAMERAS, CONDITIONS, PREP
+from stages.core.shading import KNOTS, Transport
+from stages.core.views import (
+    Geometry,
+    read_geometry,
+    read_transport,
+    view_folder,
+    write_geometry,
+    write_transport,
+)
+from stages.light.environment import Environment, load_environment, save_environment
+from stages.light.gbuffer import GBuffer, trace_view
+from stages.light.lights import BUILTIN
+from stages.light.scene import Scene
+from stages.light.transport import QUALITY, light_transport
+
+REQUEST = "request.json"
+"""What an unfinished folder was asked for; a rerun that asks for the same continues it."""
+
+
+@dataclass(frozen=True)
+class ConditionsResult:
+    """What a run did: names of environments, views made now and found made, texels mended, already up to date."""
+
+    environments: tuple[str, ...]
+    made: int
+    found: int
+    clamped: dict[str, int]
+    up_to_date: bool
+
+
+def conditions(
+    prep: Path, out: Path, options: ConditionsOptions, force: bool = False, progress: Progress = silent
+) -> ConditionsResult:
+    """Ray-trace what conditions the distillation: prep.npz in, a conditions folder out.
+
+    Raises: InputError, ArtifactError, OutputError, NumericalError.
+    """
+    mesh = load_npz(prep, PREP)
+    lights, clamped, hashes = read_lights(options.env)
+    names = tuple(light.name for light in lights)
+    chosen = plain_options(dataclasses.replace(options, env=names))
+    request = Provenance(chosen, options.seed, {"prep": sha256_file(prep), **hashes})
+    if not force and (done := peek(out, CONDITIONS)) and done.same_request(request):
+        return ConditionsResult(names, 0, options.views, clamped, True)
+
+    start_folder(out, request, force)
+    with run_log(out) as log:
+        cameras = place_cameras(mesh["vertices"].astype(np.float64), options)
+        save_cameras(out, cameras, request, options)
+        for light in lights:
+            save_environment(out / "environments" / f"{light.name}.exr", light)
+        scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        made = 0
+        for view in range(options.views):
+            progress("views", view, options.views)
+            if not view_is_there(out, view, names, options.maps):
+                trace_and_write(out, view, scene, cameras, lights, options)
+                made += 1
+        progress("views", options.views, options.views)
+        write_sheet(out, sheet(out, names, options.views))
+        log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(QUALITY[options.quality])}
+    extra = {
+        "environments": names,
+        "views": options.views,
+        "knots": KNOTS,
+        "clamped": clamped,
+        "to_world": mesh["to_world"].ravel().tolist(),
+    }
+    files = expected_files(names, options)
+    write_manifest(out, CONDITIONS, Provenance(request.options, request.seed, request.inputs, extra), files)
+    (out / REQUEST).unlink(missing_ok=True)
+    return ConditionsResult(names, made, options.views - made, clamped, False)
+
+
+def read_lights(env: tuple[str, ...]) -> tuple[list[Environment], dict[str, int], dict[str, str]]:
+    """The environments asked for: built-in ones by name, files by path.
+
+    Returns:
+        lights; texels mended in each; SHA-256 of each file, by role "environment <name>".
+    Raises: InputError.
+    """
+    lights, clamped, hashes = [], {}, {}
+    for choice in env or tuple(BUILTIN):
+        if choice in BUILTIN:
+            light, mended = BUILTIN[choice](), 0
+        else:
+            light, mended = load_environment(Path(choice))
+            hashes[f"environment {light.name}"] = sha256_file(Path(choice))
+        if light.name in clamped or light.name == "geometry":
+            raise InputError(f"{choice}: the name '{light.name}' is taken by another environment; rename the file")
+        lights.append(light)
+        clamped[light.name] = mended
+    return lights, clamped, hashes
+
+
+def start_folder(out: Path, request: Provenance, force: bool) -> None:
+    """Make the folder, or clear what an earlier run with another request left in it."""
+    if out.exists() and not out.is_dir():
+        raise OutputError(f"{out}: a file stands there, expected a folder; give another -o")
+    asked = {"options": request.options, "seed": request.seed, "inputs": request.inputs}
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        if force or read_json(out / REQUEST) != asked:
+            for name in (MANIFEST, REQUEST, "cameras.npz", "sheet.png", "run.json"):
+                (out / name).unlink(missing_ok=True)
+            for folder in [out / "environments", *out.glob("view_[0-9][0-9][0-9]*")]:
+                shutil.rmtree(folder, ignore_errors=True)
+            write_json(out / REQUEST, asked)
+    except OSError as error:
+        raise OutputError(f"{out}: cannot be written: {reason(error)}") from error
+
+
+def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: ConditionsOptions) -> None:
+    """Write cameras.npz."""
+    size = np.array(options.size, np.int32)
+    arrays = {"c2w": cameras.c2w, "fov_y": cameras.fov_y, "width": size, "height": size}
+    save_npz(out / "cameras.npz", CAMERAS, arrays, request)
+
+
+def view_is_there(out: Path, view: int, names: tuple[str, ...], maps: bool) -> bool:
+    """Whether every file of a view has been written; each is renamed into place when whole."""
+    return all((out / name).is_file() for name in view_files(view, names, maps))
+
+
+def view_files(view: int, names: tuple[str, ...], maps: bool) -> list[str]:
+    """Relative paths of a view's files."""
+    folder = view_folder(view)
+    kinds = ["geometry", *names, *(f"maps_{name}" for name in names if maps)]
+    return [f"{folder}/{kind}.exr" for kind in kinds]
+
+
+def expected_files(names: tuple[str, ...], options: ConditionsOptions) -> list[str]:
+    """Relative paths of everything a complete folder holds."""
+    views = [file for view in range(options.views) for file in view_files(view, names, options.maps)]
+    return ["cameras.npz", "sheet.png", *(f"environments/{name}.exr" for name in names), *views]
+
+
+def trace_and_write(
+    out: Path, view: int, scene: Scene, cameras: Cameras, lights: list[Environment], options: ConditionsOptions
+) -> None:
+    """One view: geometry, then its transport under every environment."""
+    c2w = cameras.c2w[view]
+    points = trace_view(scene, c2w, float(cameras.fov_y[view]), options.size, options.size)
+    geometry = Geometry(points.mask, points.depth, view_normals(points, c2w))
+    seed = options.seed * 1_000_003 + view
+    transports = light_transport(scene, points, lights, QUALITY[options.quality], seed)
+    write_geometry(out, view, geometry)
+    for light, transport in zip(lights, transports, strict=True):
+        check_finite(transport, light.name, view, options.seed)
+        write_transport(out, view, light.name, geometry.mask, transport)
+        if options.maps:
+            write_maps(out, view, light.name, geometry, transport)
+
+
+def view_normals(points: GBuffer, c2w: NDArray) -> NDArray[np.float32]:
+    """Shading normals in the camera's frame. Returns: (H, W, 3), 0 off the object."""
+    image = np.zeros((*points.mask.shape, 3), np.float32)
+    image[points.mask] = points.n @ c2w[:3, :3].astype(np.float32)
+    return image
+
+
+def check_finite(transport: Transport, environment: str, view: int, seed: int) -> None:
+    """Raises: NumericalError naming environment, view, pixel and seed."""
+    for name, values in (("E", transport.E), ("A", transport.A), ("B", transport.B)):
+        bad = (~values.isfinite()).reshape(len(values), -1).any(1).nonzero()
+        if len(bad):
+            raise NumericalError(
+                f"transport {name} is not finite: environment {environment}, view {view}, pixel {int(bad[0])} of the "
+                f"object, seed {seed}; please report it with the mesh"
+            )
+
+
+def sheet(out: Path, names: tuple[str, ...], views: int) -> list[NDArray]:
+    """Rows of the contact sheet, read back from the files."""
+    rows = []
+    for view in sorted({i * views // SHEET_VIEWS for i in range(SHEET_VIEWS)}):
+        geometry = read_geometry(out, view)
+        rows += sheet_rows(geometry, [read_transport(out, view, name, geometry.mask) for name in names])
+    return rows

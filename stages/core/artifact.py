@@ -1,0 +1,380 @@
+"""Artefacts: the NPZ and EXR files that stages hand each other. No other module knows either format.
+
+An artefact says what it is (schema name and version), what it was made with (options, seed) and from (SHA-256 of
+each input). Its bytes are a function of exactly these: seconds and memory go to a run log beside it, `<name>.run.json`,
+so that the same inputs give the same hash on every run. Files are written under a temporary name in the same folder and
+renamed, so a reader, or Make, never sees half a file. A folder artefact is complete when its `manifest.json` is there,
+which is written last.
+"""
+
+import contextlib
+import dataclasses
+import errno
+import hashlib
+import json
+import os
+import resource
+import time
+import zipfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+from numpy.typing import NDArray
+
+from stages.core.errors import ArtifactError, InputError, OutputError
+
+MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True)
+class Field:
+    """One array of an artefact.
+
+    dtype: NumPy dtype string, such as "f4". shape: sizes; a letter stands for any size, the same wherever it recurs.
+    """
+
+    dtype: str
+    shape: tuple[int | str, ...]
+    finite: bool = True
+
+
+@dataclass(frozen=True)
+class Schema:
+    """Name, version and arrays of an artefact; `extra` names the keys that its provenance must carry.
+
+    manifest: the file that completes a folder artefact.
+    """
+
+    name: str
+    version: int
+    fields: Mapping[str, Field] = field(default_factory=dict)
+    extra: tuple[str, ...] = ()
+    manifest: str = MANIFEST
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What an artefact was made with and from.
+
+    options: the stage's options, JSON types only. inputs: role -> SHA-256 in hex. extra: what the stage has to say
+    about its result (JSON types); it must be a function of options, seed and inputs.
+    """
+
+    options: dict[str, Any]
+    seed: int | None
+    inputs: dict[str, str]
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    def same_request(self, other: "Provenance") -> bool:
+        """Whether both were asked for alike: equal options, seed and inputs."""
+        return (self.options, self.seed, self.inputs) == (other.options, other.seed, other.inputs)
+
+
+@dataclass(frozen=True)
+class Artifact:
+    """A loaded artefact: its arrays and its provenance."""
+
+    arrays: dict[str, NDArray]
+    provenance: Provenance
+
+    def __getitem__(self, name: str) -> NDArray:
+        return self.arrays[name]
+
+
+# ---------------------------------------------------------------------------------------------------- hashing
+
+
+def sha256_file(path: Path) -> str:
+    """SHA-256 of a file's bytes, in hex. Raises: InputError when it cannot be read."""
+    digest = hashlib.sha256()
+    try:
+        with open(path, "rb") as stream:
+            while block := stream.read(1 << 20):
+                digest.update(block)
+    except OSError as error:
+        raise InputError(f"{path}: {reason(error)}") from error
+    return digest.hexdigest()
+
+
+def plain_options(options: Any) -> dict[str, Any]:
+    """A stage's options dataclass as JSON types, ready for `Provenance.options`."""
+    return json.loads(json.dumps(dataclasses.asdict(options), default=str))
+
+
+def reason(error: OSError) -> str:
+    """What the operating system says, without path or number."""
+    return (error.strerror or str(error)).lower()
+
+
+# ---------------------------------------------------------------------------------------------------- writing
+
+
+@contextlib.contextmanager
+def written_atomically(path: Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; rename it on success, remove it on any failure.
+
+    The temporary name keeps the suffix, since some writers choose the format by it.
+
+    Raises: OutputError with the cause when the file system refuses.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield temporary
+        os.replace(temporary, path)
+    except OSError as error:
+        hint = "; free some space and run the same command again" if error.errno == errno.ENOSPC else ""
+        raise OutputError(f"{path}: cannot be written: {reason(error)}{hint}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a UTF-8 text file atomically."""
+    with written_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write a JSON file atomically, keys in the order given, indented by one space."""
+    write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def read_json(path: Path) -> Any:
+    """The content of a JSON file, or None when there is none that can be read."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def save_npz(path: Path, schema: Schema, arrays: Mapping[str, NDArray], provenance: Provenance) -> None:
+    """Write an NPZ artefact atomically; the arrays must fit the schema.
+
+    Raises: OutputError; AssertionError when our own arrays break the schema.
+    """
+    problem = schema_problem(schema, arrays) or extra_problem(schema, provenance)
+    assert problem is None, f"{path}: {problem}"
+    header = json.dumps(_header(schema, provenance), allow_nan=False)
+    with written_atomically(path) as temporary, open(temporary, "wb") as stream:
+        np.savez(stream, header=np.array(header), **dict(arrays), allow_pickle=False)
+
+
+@contextlib.contextmanager
+def run_log(artifact: Path) -> Iterator[dict[str, Any]]:
+    """Measure the block and write `<artifact>.run.json` (inside it for a folder): seconds, peak memory, extras.
+
+    Yields: a dict to which the stage adds what else it measured. Nothing is written when the block fails.
+    """
+    measured: dict[str, Any] = {}
+    start = time.perf_counter()
+    yield measured
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    log = {"seconds": round(time.perf_counter() - start, 3), "peak_memory_gib": round(peak, 3), **measured}
+    write_json(artifact / "run.json" if artifact.is_dir() else artifact.with_name(artifact.name + ".run.json"), log)
+
+
+# ---------------------------------------------------------------------------------------------------- reading
+
+
+def load_npz(path: Path, schema: Schema) -> Artifact:
+    """Read an NPZ artefact and check it against its schema.
+
+    Raises: ArtifactError that says what is wrong with which file.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            if not isinstance(archive, np.lib.npyio.NpzFile) or "header" not in archive.files:
+                raise ArtifactError(f"{path}: not a dreammat artefact; expected {schema.name}")
+            header = json.loads(str(archive["header"]))
+            arrays = {name: archive[name] for name in archive.files if name != "header"}
+    except OSError as error:
+        raise ArtifactError(f"{path}: {reason(error)}; expected a {schema.name} artefact") from error
+    except (ValueError, zipfile.BadZipFile, EOFError, KeyError, zipfile.error) as error:
+        raise ArtifactError(
+            f"{path}: not a readable {schema.name} artefact (damaged, or another kind of file); make it again"
+        ) from error
+    provenance = _provenance(path, schema, header)
+    problem = schema_problem(schema, arrays) or extra_problem(schema, provenance)
+    if problem:
+        raise ArtifactError(f"{path}: {problem}; make it again with the stage before")
+    return Artifact(arrays, provenance)
+
+
+def peek(path: Path, schema: Schema) -> Provenance | None:
+    """The provenance of an intact artefact (NPZ file or folder), or None when there is none of this schema."""
+    try:
+        return read_manifest(path, schema)[0] if path.is_dir() else load_npz(path, schema).provenance
+    except ArtifactError:
+        return None
+
+
+def expect_input(path: Path, provenance: Provenance, role: str, found: str, found_path: Path) -> None:
+    """Check that an artefact was made from the given input.
+
+    Args:
+        path, provenance: the artefact. role: the input's name in it. found, found_path: hash and path of what is given.
+    Raises: ArtifactError.
+    """
+    made_from = provenance.inputs.get(role)
+    if made_from != found:
+        raise ArtifactError(
+            f"{path}: made from another {role} ({(made_from or 'none')[:12]}) than {found_path} ({found[:12]}); "
+            f"give the {role} it was made from, or make it again"
+        )
+
+
+def schema_problem(schema: Schema, arrays: Mapping[str, NDArray]) -> str | None:
+    """The first way in which the arrays break the schema, or None."""
+    sizes: dict[str, int] = {}
+    for name, spec in schema.fields.items():
+        if name not in arrays:
+            return f"array '{name}' is missing"
+        array = arrays[name]
+        if array.dtype != np.dtype(spec.dtype):
+            return f"array '{name}' is {array.dtype}, expected {np.dtype(spec.dtype)}"
+        expected = tuple(sizes.get(s, s) if isinstance(s, str) else s for s in spec.shape)
+        fits = array.ndim == len(expected) and all(
+            isinstance(e, str) or e == n for e, n in zip(expected, array.shape, strict=True)
+        )
+        if not fits:
+            return f"array '{name}' has shape {array.shape}, expected {expected}"
+        sizes |= {e: n for e, n in zip(expected, array.shape, strict=True) if isinstance(e, str)}
+        if spec.finite and array.dtype.kind == "f" and not np.isfinite(array).all():
+            return f"array '{name}' holds {int((~np.isfinite(array)).sum())} values that are not finite"
+    unknown = set(arrays) - set(schema.fields)
+    return f"array '{sorted(unknown)[0]}' is not part of {schema.name}" if unknown else None
+
+
+def extra_problem(schema: Schema, provenance: Provenance) -> str | None:
+    """The first key of `schema.extra` that the provenance lacks, as a message, or None."""
+    return next((f"'{key}' is missing from the header" for key in schema.extra if key not in provenance.extra), None)
+
+
+def _header(schema: Schema, provenance: Provenance) -> dict[str, Any]:
+    return {"schema": schema.name, "version": schema.version, **dataclasses.asdict(provenance)}
+
+
+def _provenance(path: Path, schema: Schema, header: Any) -> Provenance:
+    if not isinstance(header, dict) or header.get("schema") != schema.name:
+        found = header.get("schema") if isinstance(header, dict) else None
+        raise ArtifactError(f"{path}: a {found or 'foreign'} artefact, expected {schema.name}; check the paths' order")
+    if header.get("version") != schema.version:
+        raise ArtifactError(
+            f"{path}: {schema.name} version {header.get('version')}, expected {schema.version}; make it again"
+        )
+    try:
+        return Provenance(**{key: header[key] for key in ("options", "seed", "inputs", "extra")})
+    except KeyError as error:
+        raise ArtifactError(f"{path}: its header lacks {error}; make it again with the stage before") from error
+
+
+# ---------------------------------------------------------------------------------------------------- folders
+
+
+def write_manifest(folder: Path, schema: Schema, provenance: Provenance, files: list[str]) -> None:
+    """Complete a folder artefact: record provenance and the SHA-256 of each of its files (relative paths)."""
+    hashes = {name: sha256_file(folder / name) for name in sorted(files)}
+    write_json(folder / schema.manifest, {**_header(schema, provenance), "files": hashes})
+
+
+def read_manifest(folder: Path, schema: Schema) -> tuple[Provenance, dict[str, str]]:
+    """Provenance and file hashes of a complete folder artefact whose files are all there.
+
+    Raises: ArtifactError.
+    """
+    path = folder / schema.manifest
+    try:
+        header = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        hint = "an interrupted run continues with the same command" if folder.is_dir() else f"expected {schema.name}"
+        raise ArtifactError(f"{path}: {reason(error)}; {hint}") from error
+    except ValueError as error:
+        raise ArtifactError(f"{path}: not readable ({error}); make it again with the stage before") from error
+    provenance = _provenance(path, schema, header)
+    files = header.get("files")
+    if not isinstance(files, dict):
+        raise ArtifactError(f"{path}: lists no files; make it again with the stage before")
+    missing = next((name for name in files if not (folder / name).is_file()), None)
+    if missing:
+        raise ArtifactError(f"{folder / missing}: missing, though the manifest lists it; make it again with --force")
+    return provenance, files
+
+
+# ---------------------------------------------------------------------------------------------------- EXR
+
+
+def write_exr(
+    path: Path,
+    channels: Mapping[str, NDArray],
+    display: tuple[int, int] | None = None,
+    offset: tuple[int, int] = (0, 0),
+    attributes: Mapping[str, str] | None = None,
+) -> None:
+    """Write named channels as one scan-line EXR, atomically, ZIP-compressed.
+
+    Args:
+        channels: name -> (h, w) float16 or float32, all of one shape.
+        display: (height, width) of the whole image when the channels are a crop of it. offset: (row, column) of
+        the crop. attributes: strings for the header.
+    """
+    h, w = next(iter(channels.values())).shape
+    rows, columns = display or (h, w)
+    (top, left) = offset
+    header = {
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "type": OpenEXR.scanlineimage,
+        "dataWindow": (np.array([left, top], "i4"), np.array([left + w - 1, top + h - 1], "i4")),
+        "displayWindow": (np.array([0, 0], "i4"), np.array([columns - 1, rows - 1], "i4")),
+        **(attributes or {}),
+    }
+    pixels = {name: np.ascontiguousarray(value) for name, value in channels.items()}
+    with written_atomically(path) as temporary:
+        try:
+            with OpenEXR.File(header, pixels) as file:
+                file.write(str(temporary))
+        except RuntimeError as error:
+            raise OSError(errno.EIO, str(error)) from error
+
+
+@dataclass(frozen=True)
+class ExrImage:
+    """Channels of an EXR file: name -> (h, w), the crop's (row, column) offset, the whole image's size, the header."""
+
+    channels: dict[str, NDArray]
+    offset: tuple[int, int]
+    display: tuple[int, int]
+    attributes: dict[str, Any]
+
+    def full(self, name: str) -> NDArray:
+        """A channel at the whole image's size, 0 outside the crop."""
+        image = np.zeros(self.display, self.channels[name].dtype)
+        h, w = self.channels[name].shape
+        top, left = self.offset
+        image[top : top + h, left : left + w] = self.channels[name]
+        return image
+
+
+def read_exr(path: Path, error_type: type[ArtifactError] | type[InputError] = ArtifactError) -> ExrImage:
+    """Read all channels of an EXR file.
+
+    Raises: `error_type` (ArtifactError for our own files, InputError for the user's) that names file and cause.
+    """
+    try:
+        with open(path, "rb"):
+            pass
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            header = dict(file.header())
+            channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+    except OSError as error:
+        raise error_type(f"{path}: {reason(error)}") from error
+    except Exception as error:  # the binding raises whatever the C++ library throws
+        raise error_type(f"{path}: not a readable EXR file ({str(error).splitlines()[0][:120]})") from error
+    (left, top), _ = header["dataWindow"]
+    (x0, y0), (x1, y1) = header["displayWindow"]
+    return ExrImage(channels, (int(top - y0), int(left - x0)), (int(y1 - y0 + 1), int(x1 - x0 + 1)), header)

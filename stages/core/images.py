@@ -1,0 +1,50 @@
+"""Eight-bit and HDR pictures through OpenImageIO: PNG out and in, Radiance HDR in."""
+
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from stages.core.artifact import written_atomically
+from stages.core.errors import InputError
+
+
+def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
+    """Write an 8-bit PNG atomically.
+
+    Args:
+        pixels: (H, W), (H, W, 3) or (H, W, 4); uint8, or float in [0, 1] already encoded as the file wants it
+        (rounded to nearest, clamped).
+        compression: zlib's level, 0 to 9.
+    """
+    if pixels.dtype != np.uint8:
+        pixels = (np.clip(pixels, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
+    pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None])
+    height, width, count = pixels.shape
+    with written_atomically(path) as temporary:
+        output = oiio.ImageOutput.create(str(temporary))
+        spec = oiio.ImageSpec(width, height, count, "uint8")
+        spec["png:compressionLevel"] = compression
+        written = output.open(str(temporary), spec)
+        written = written and output.write_image(pixels) and output.close()
+        if not written:
+            raise OSError(output.geterror() or "the PNG writer failed")
+
+
+def read_image(path: Path) -> NDArray[np.float32]:
+    """Read any picture OpenImageIO knows, integers scaled to [0, 1].
+
+    Returns:
+        (H, W, C) float32, values as stored (no transfer curve applied).
+    Raises: InputError.
+    """
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        raise InputError(f"{path}: not a readable picture ({oiio.geterror().strip().splitlines()[0]})")
+    pixels = source.read_image("float")
+    problem = source.geterror()
+    source.close()
+    if pixels is None:
+        raise InputError(f"{path}: not a readable picture ({problem.strip()})")
+    return pixels

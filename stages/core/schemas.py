@@ -1,0 +1,76 @@
+"""The artefacts by which stages meet. What a stage reads of another stage is stated here and nowhere else.
+
+A *loop* is one corner of one face of the source, in the order of the file (Blender's word).
+"""
+
+from stages.core.artifact import Field, Schema
+
+PREP = Schema(
+    "dreammat.prep",
+    1,
+    {
+        # the working mesh: normalised world frame, welded, outward, triangles
+        "vertices": Field("f4", ("V", 3)),
+        "triangles": Field("i4", ("F", 3)),
+        "normals": Field("f4", ("F", 3, 3)),  # unit shading normal per triangle corner
+        "uv": Field("f4", ("F", 3, 2)),  # per triangle corner, [0, 1], v up
+        "charts": Field("i4", ("F",)),  # UV chart of each triangle, from 0
+        "triangle_loops": Field("i4", ("F", 3)),  # the source loop of each triangle corner
+        # the source, as it was
+        "to_world": Field("f8", (4, 4)),  # source frame (node transforms applied) to world
+        "source_vertices": Field("f8", ("SV", 3), finite=False),  # the file's numbers, node transforms not applied
+        "source_uv": Field("f8", ("ST", 2), finite=False),  # the file's numbers; v as in the file's format
+        "source_normals": Field("f4", ("SN", 3), finite=False),
+        "loop_start": Field("i4", ("P1",)),  # face p has loops loop_start[p] .. loop_start[p + 1] - 1
+        "loop_vertex": Field("i4", ("L",)),
+        "loop_source_uv": Field("i4", ("L",)),  # row of source_uv, or -1
+        "loop_source_normal": Field("i4", ("L",)),  # row of source_normals, or -1
+        "face_part": Field("i4", ("P",)),  # entry of extra["parts"]
+        "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, [0, 1], v up
+    },
+    # source_format: "obj" | "ply" | "stl" | "off" | "glb"; uv_kept: bool; findings: what was found and mended;
+    # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row)}
+    extra=("source_format", "source_name", "uv_kept", "parts", "findings"),
+)
+
+CAMERAS = Schema(
+    "dreammat.cameras",
+    1,
+    {
+        "c2w": Field("f8", ("N", 4, 4)),
+        "fov_y": Field("f8", ("N",)),  # radians
+        "width": Field("i4", ()),
+        "height": Field("i4", ()),
+    },
+)
+
+CONDITIONS = Schema(
+    "dreammat.conditions",
+    1,
+    # environments: names; views: count; knots: roughness of each A and B; clamped: name -> mended texels;
+    # to_world: 16 numbers, the mesh source's frame to world, row by row
+    extra=("environments", "views", "knots", "clamped", "to_world"),
+)
+"""A folder: cameras.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr."""
+
+MATERIAL = Schema(
+    "dreammat.material",
+    1,
+    {
+        "table": Field("f4", ("T", "C")),  # hash grid entries, all levels in one table
+        "weights_0": Field("f4", ("H0", "I0")),  # MLP, (out, in) each
+        "weights_1": Field("f4", ("H1", "H0")),
+        "bias_0": Field("f4", ("H0",)),
+        "bias_1": Field("f4", ("H1",)),
+        "curve_step": Field("i4", ("S",)),
+        "curve_loss": Field("f4", ("S",)),
+        "c2w": Field("f8", ("N", 4, 4)),  # the views that distillation saw
+        "fov_y": Field("f8", ("N",)),
+        "size": Field("i4", (2,)),  # width, height of those views
+    },
+    # field: FieldConfig as a dict; prompt; guidance: name and what identifies its model; environments: names used
+    extra=("field", "prompt", "guidance", "environments"),
+)
+
+ASSET = Schema("dreammat.asset", 1, manifest="bake.json")
+"""A folder: albedo, roughness and metallic .exr; albedo.png, orm.png; model.glb; preview.png; bake.json."""

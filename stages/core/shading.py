@@ -1,0 +1,186 @@
+"""Outgoing radiance from light transport: exact in albedo and metallic, interpolated in roughness.
+
+With transport E, A(r), B(r) of one pixel and one environment (see `stages.light.transport`):
+
+    radiance = (1 - m) c E + (F0 (1 - m) + m c) A(r) + B(r),   F0 = 0.04
+
+A and B are stored at the roughness `KNOTS`. Between them, what is interpolated is A and B relative to the albedo of an
+open point (`core.albedo`), by a monotone cubic: exact in a white furnace, and a third of the error of straight lines under
+real lights.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from stages.core.albedo import specular_albedo
+
+F0 = 0.04
+"""Normal reflectance of every dielectric: glTF 2.0, index of refraction 1.5."""
+
+KNOTS = (0.0, 0.08, 0.16, 0.25, 0.36, 0.5, 0.65, 0.82, 1.0)
+"""Roughness at which A and B are stored; holds 0, 0.5 and 1."""
+
+LIGHT_MAPS = tuple((m, r) for m in (0, 1) for r in (0.0, 0.5, 1.0))
+"""Metallic and roughness of the six light maps, in the paper's order."""
+
+
+@dataclass(frozen=True)
+class Transport:
+    """Light transport of P points under one environment.
+
+    E: (P, 3) diffuse. A, B: (P, K, 3) specular at `KNOTS`. Linear radiance per unit reflectance.
+    cosine: (P,) N·V in (0, 1].
+    """
+
+    E: Tensor
+    A: Tensor
+    B: Tensor
+    cosine: Tensor
+
+    def __getitem__(self, index: Tensor | slice) -> "Transport":
+        return Transport(self.E[index], self.A[index], self.B[index], self.cosine[index])
+
+    def to(self, *args: Any, **kwargs: Any) -> "Transport":
+        """Every tensor moved or cast as `Tensor.to` does."""
+        return Transport(*(t.to(*args, **kwargs) for t in (self.E, self.A, self.B, self.cosine)))
+
+    def packed(self) -> Tensor:
+        """All values of a point in one row: (P, WIDTH), the order of `unpack`."""
+        return torch.cat([self.E, self.A.flatten(1), self.B.flatten(1), self.cosine[:, None]], 1)
+
+    @staticmethod
+    def unpack(rows: Tensor) -> "Transport":
+        """The transport whose rows `packed` made. Args: (P, WIDTH)."""
+        E, A, B, cosine = rows.split([3, 3 * len(KNOTS), 3 * len(KNOTS), 1], 1)
+        return Transport(E, A.unflatten(1, (-1, 3)), B.unflatten(1, (-1, 3)), cosine[:, 0])
+
+
+WIDTH = 3 + 6 * len(KNOTS) + 1
+"""Values of a point in packed form."""
+
+LEAST_ALBEDO = 1e-4
+"""Under this an open point's albedo is no scale to interpolate by (B, seen head-on); B itself is interpolated there."""
+
+
+@dataclass(frozen=True)
+class Material:
+    """Metallic-roughness material of P points: albedo (P, 3), roughness (P,), metallic (P,), each in [0, 1]."""
+
+    albedo: Tensor
+    roughness: Tensor
+    metallic: Tensor
+
+
+def shade(transport: Transport, material: Material) -> Tensor:
+    """Outgoing radiance of P points, each under L lights.
+
+    Args:
+        transport: P L rows, all lights of a point after each other; L is 1 where there are as many rows as points.
+    Returns:
+        (P L, 3) linear. Differentiable in: albedo, roughness (once, everywhere), metallic.
+    """
+    inputs = (material.albedo, material.roughness, material.metallic)
+    if all(t.device.type == "cpu" and t.dtype == torch.float32 for t in inputs):
+        return _KernelShading.apply(transport, *inputs)
+    return shade_reference(transport, material)
+
+
+def shade_reference(transport: Transport, material: Material) -> Tensor:
+    """`shade` in plain torch, for any device and dtype. Differentiable in: as `shade`."""
+    lights = len(transport.E) // max(len(material.roughness), 1)
+    c, r, m = (t.repeat_interleave(lights, 0) for t in (material.albedo, material.roughness, material.metallic))
+    A, B = interpolate(transport, r)
+    m = m[:, None]
+    return (1 - m) * c * transport.E + (F0 * (1 - m) + m * c) * A + B
+
+
+class _KernelShading(torch.autograd.Function):
+    """`shade_reference` on the CPU in float32, compiled."""
+
+    @staticmethod
+    def forward(  # type: ignore[override]
+        ctx: Any, transport: Transport, albedo: Tensor, roughness: Tensor, metallic: Tensor
+    ) -> Tensor:
+        from stages.core import shading_kernels  # compiled code is loaded on first use
+
+        light = tuple(t.float().numpy() for t in (transport.E, transport.A, transport.B, transport.cosine))
+        material = tuple(t.detach().numpy() for t in (albedo, roughness, metallic))
+        radiance, A, by_roughness = shading_kernels.shade(light, material, KNOTS, (F0, LEAST_ALBEDO))  # type: ignore[arg-type]
+        ctx.saved = (light[0], A, by_roughness, material)
+        return torch.from_numpy(radiance)
+
+    @staticmethod
+    def backward(ctx: Any, gradient: Tensor) -> tuple[None, Tensor, Tensor, Tensor]:  # type: ignore[override]
+        from stages.core import shading_kernels
+
+        E, A, by_roughness, material = ctx.saved
+        gradients = shading_kernels.shade_backward(gradient.numpy(), E, A, by_roughness, material, F0)
+        c, r, m = (torch.from_numpy(g) for g in gradients)
+        return None, c, r, m
+
+
+def interpolate(transport: Transport, roughness: Tensor) -> tuple[Tensor, Tensor]:
+    """A and B at the given roughness.
+
+    Source: Fritsch & Butland 1984, monotone piecewise cubic interpolation with harmonic-mean slopes.
+
+    Args:
+        roughness: (P,) in [0, 1].
+    Returns:
+        (P, 3) each. Differentiable in: roughness.
+    """
+    knots = torch.tensor(KNOTS, dtype=roughness.dtype, device=roughness.device)
+    last = len(KNOTS) - 1
+    left = torch.searchsorted(knots, roughness.detach().contiguous(), right=True).sub(1).clamp(0, last - 1)  # (P,)
+    near = torch.stack([(left + k).clamp(0, last) for k in (-1, 0, 1, 2)], 1)  # (P, 4)
+    r = knots[near]
+    row = torch.arange(len(roughness), device=roughness.device)[:, None]
+    stacked = torch.cat([transport.A[row, near], transport.B[row, near]], -1).to(roughness.dtype)  # (P, 4, 6)
+    y = stacked / _knot_albedo(transport.cosine.to(roughness.dtype))[row, near].repeat_interleave(3, -1)
+    step = (r[:, 1:] - r[:, :-1])[..., None]  # (P, 3, 1); 0 beyond the ends
+    rise = (y[:, 1:] - y[:, :-1]) / torch.where(step > 0, step, torch.ones_like(step))
+    slope_left = _slope(rise[:, 0], rise[:, 1], step[:, 0], step[:, 1])
+    slope_right = _slope(rise[:, 1], rise[:, 2], step[:, 1], step[:, 2])
+    h = step[:, 1]
+    x = (roughness[:, None] - r[:, 1:2]) / h
+    ease, tail = x * x * (3 - 2 * x), x * x * (x - 1)
+    relative = y[:, 1] * (1 - ease) + y[:, 2] * ease + h * (slope_left * x * (1 - x) ** 2 + slope_right * tail)
+    albedo = specular_albedo(roughness, transport.cosine.to(roughness.dtype)).clamp(min=LEAST_ALBEDO)
+    A, B = (relative * albedo.repeat_interleave(3, -1)).split(3, -1)
+    return A, B
+
+
+def _knot_albedo(cosine: Tensor) -> Tensor:
+    """Open-point albedo of A and B at every knot. Args: (P,). Returns: (P, K, 2), positive."""
+    albedo = [specular_albedo(torch.full_like(cosine, r), cosine) for r in KNOTS]
+    return torch.stack(albedo, 1).clamp(min=LEAST_ALBEDO)
+
+
+def _slope(before: Tensor, after: Tensor, step_before: Tensor, step_after: Tensor) -> Tensor:
+    """Slope at a knot from those of its two intervals: their weighted harmonic mean, 0 at an extremum.
+
+    At the ends, where one interval has no width, it is the slope of the other.
+    """
+    wide, narrow = step_before + 2 * step_after, 2 * step_before + step_after
+    same = before * after > 0
+    a, b = (torch.where(same, t, torch.ones_like(t)) for t in (before, after))
+    mean = (wide + narrow) / (narrow / a + wide / b)
+    inner = torch.where(same, mean, torch.zeros_like(mean))
+    return torch.where(step_before > 0, torch.where(step_after > 0, inner, before), after)
+
+
+def light_maps(transport: Transport) -> Tensor:
+    """The six light maps that condition a diffusion model: white albedo, metallic and roughness of `LIGHT_MAPS`.
+
+    Returns:
+        (P, 6, 3) linear radiance.
+    """
+    maps = []
+    for m, r in LIGHT_MAPS:
+        k = KNOTS.index(r)
+        A, B = transport.A[:, k], transport.B[:, k]
+        maps.append(A + B if m else transport.E + F0 * A + B)
+    return torch.stack(maps, 1)

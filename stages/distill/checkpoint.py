@@ -1,0 +1,119 @@
+"""The state of an unfinished run, kept beside its output so that the same command continues it.
+
+Every step draws its random numbers from a generator made from seed and step number alone (`step_generator`), so there
+is no random state to keep: parameters, moments and the number of the step are all of it, and a continued run ends in
+the same bytes as an uninterrupted one.
+"""
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import FrameType
+
+import numpy as np
+import torch
+
+from stages.core.artifact import Artifact, Field, Provenance, Schema, load_npz, save_npz
+from stages.core.errors import ArtifactError
+from stages.core.field import MaterialField
+from stages.distill.optimizer import RowAdam
+
+SECONDS = 60.0
+"""Time between checkpoints."""
+
+_NETWORK = ("weights_0", "weights_1", "bias_0", "bias_1")
+CHECKPOINT = Schema(
+    "dreammat.distill.checkpoint",
+    1,
+    {
+        "table": Field("f4", ("T", "C")),
+        "m.table": Field("f4", ("T", "C")),
+        "v.table": Field("f4", ("T", "C")),
+        "count.table": Field("i4", ("T",)),
+        **{name: Field("f4", (f"{name}.0", *(() if name.startswith("bias") else (f"{name}.1",)))) for name in _NETWORK},
+        **{f"{kind}.{name}": Field("f4", (1, f"{name}.size")) for name in _NETWORK for kind in "mv"},
+        **{f"count.{name}": Field("i4", (1,)) for name in _NETWORK},
+        "loss": Field("f4", ("S",)),
+        "seconds": Field("f8", ("S",)),
+    },
+)
+
+
+@dataclass
+class State:
+    """A run between two steps: field, optimiser, and of every step done its loss and the seconds since the start."""
+
+    field: MaterialField
+    optimizer: RowAdam
+    loss: list[float] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+
+    @property
+    def step(self) -> int:
+        """Steps done."""
+        return len(self.loss)
+
+
+def step_generator(seed: int, step: int) -> torch.Generator:
+    """The random numbers of one step: a function of seed and step."""
+    mixed = int(np.random.SeedSequence([seed, step]).generate_state(1, np.uint64)[0])
+    return torch.Generator().manual_seed(mixed >> 1)
+
+
+def checkpoint_path(out: Path) -> Path:
+    """Where the state of an unfinished `out` lies."""
+    return out.with_name(out.name + ".checkpoint")
+
+
+def save(out: Path, state: State, request: Provenance) -> None:
+    """Write the checkpoint, atomically."""
+    curve = {"loss": np.array(state.loss, np.float32), "seconds": np.array(state.seconds, np.float64)}
+    arrays = {**state.field.to_arrays(), **state.optimizer.to_arrays(), **curve}
+    save_npz(checkpoint_path(out), CHECKPOINT, arrays, request)
+
+
+def resume(out: Path, state: State, request: Provenance) -> bool:
+    """Bring `state` to where an interrupted run with the same request stood. Returns: whether there was one."""
+    try:
+        stored = load_npz(checkpoint_path(out), CHECKPOINT)
+    except ArtifactError:
+        return False
+    if not stored.provenance.same_request(request) or not _fits(stored, state):
+        return False
+    with torch.no_grad():
+        for name, parameter in state.field.named_parameters():
+            parameter.copy_(torch.from_numpy(stored[name]))
+    state.loss, state.seconds = stored["loss"].tolist(), stored["seconds"].tolist()
+    state.optimizer.load_arrays(stored.arrays, state.step)
+    return True
+
+
+def _fits(stored: Artifact, state: State) -> bool:
+    return all(stored[name].shape == tuple(p.shape) for name, p in state.field.named_parameters())
+
+
+@contextlib.contextmanager
+def interruptions() -> Iterator[Callable[[], bool]]:
+    """Within the block a first Ctrl-C or SIGTERM is only noted, so that a step can end; a second one acts at once.
+
+    Yields: a function that tells whether one has come. Outside the main thread nothing is changed.
+    """
+    noted: list[int] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if noted:
+            raise KeyboardInterrupt
+        noted.append(number)
+
+    before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(noted)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,27 @@
+"""What distillation can be asked for. Symbols are those of the paper (Zhang et al. 2024, DreamMat)."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+NEGATIVE_PROMPT = "blurry, low quality, noisy, shadows, highlights, baked lighting"
+
+
+@dataclass(frozen=True)
+class DistillOptions:
+    """Options of `stages.distill.stage.distill`; `--guidance reference` uses those marked * and nothing below them."""
+
+    guidance: str = "prior"  # * "prior": the embedded diffusion model; "reference": the known material of a model
+    reference: Path | None = None  # * glTF binary or other textured scene, for the reference guidance
+    steps: int = 2000  # * optimiser steps
+    batch: int = 1  # * images a step, or that many times PIXELS for the reference
+    learning_rate: float = 0.01  # * of Adam, at the start
+    seed: int = 0  # *
+    device: str = "cpu"  # * a torch device
+    smoothness: float = 0.0  # * weight of ‖Γ(p) - Γ(p + ε)‖²
+    prompt: str = ""  # what the object is made of
+    negative_prompt: str = NEGATIVE_PROMPT  # what the picture should not look like
+    eta1: float = 1.05  # weight of the positive prediction, Eq. 7
+    eta2_start: float = 1.0  # weight of the negative prediction at the first step
+    eta2_end: float = 0.5  # and from two thirds of the steps on
+    posterior: float = 0.0  # share of (eps_pos - noise) added to the classifier score; 0 is the paper's
+    bimodal: float = 0.0  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end

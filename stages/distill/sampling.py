@@ -1,0 +1,183 @@
+"""Which part of the views a step shows to its guidance: square crops for an image model, loose pixels for a target.
+
+A crop is point-sampled at a stride, with no filter: its pixels are pixels of the stored view, so that field points, light
+transport and conditions belong together exactly. The stride of the whole view is the smallest that fits it into the
+square; zoomed crops halve it down to single pixels and are centred on an object pixel.
+"""
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from stages.core.shading import WIDTH, Transport
+from stages.distill.views import CACHE_BYTES, READERS, Surface, Views
+
+WHOLE_VIEW_SHARE = 0.5
+"""Share of crops that show the whole view; the others are zoomed in, each stride as likely as the next."""
+
+
+@dataclass(frozen=True)
+class Images:
+    """How a sample's P points lie in its B square images of S pixels.
+
+    pixel: (P,) flat index into B x S x S. surface: depth and normal of the points. azimuth, elevation: (B,) of the
+    cameras, radians, the front of the object at azimuth 0.
+    """
+
+    count: int
+    size: int
+    pixel: Tensor
+    surface: Surface
+    azimuth: NDArray[np.float64]
+    elevation: NDArray[np.float64]
+
+    def paint(self, values: Tensor) -> Tensor:
+        """Values (P, C) as images (B, C, S, S), 0 off the object. Differentiable in: values."""
+        flat = values.new_zeros(self.count * self.size**2, values.shape[1]).index_copy(0, self.pixel, values)
+        return flat.view(self.count, self.size, self.size, -1).permute(0, 3, 1, 2)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What one step shows: P points (P, 3) with normals (P, 3), world, each under `lights` = L lights.
+
+    transport: of P L rows, all lights of a point after each other. source: (view, environment) of each image, for messages.
+    images: the layout of crops; rows: (P,) of loose pixels in their pool. The one that does not apply is None.
+    """
+
+    points: Tensor
+    normals: Tensor
+    lights: int
+    transport: Transport
+    source: tuple[tuple[int, int], ...] = ()
+    images: Images | None = None
+    rows: Tensor | None = None
+
+
+class Sampler(Protocol):
+    """Draws samples; what it draws is a function of the generator alone."""
+
+    def draw(self, generator: torch.Generator) -> Sample:
+        """The sample of a step."""
+
+    def prefetch(self, generator: torch.Generator) -> None:
+        """Get ready for the draw with an equal generator."""
+
+
+class CropSampler:
+    """Square crops of size S, each of a random view under a random environment."""
+
+    def __init__(self, views: Views, size: int, batch: int, device: torch.device) -> None:
+        self._views, self._size, self._batch, self._device = views, size, batch, device
+        whole = math.ceil(max(views.width, views.height) / size)
+        self._strides = [whole // 2**i for i in range(whole.bit_length())]
+
+    def draw(self, generator: torch.Generator) -> Sample:
+        keys = self._keys(generator)
+        crops = [self._crop(view, generator) for view, _ in keys]
+        lights = [self._views.transport(*key)[torch.from_numpy(rows)] for key, (rows, _) in zip(keys, crops, strict=True)]
+        surfaces = [self._views.surface(key[0], rows) for key, (rows, _) in zip(keys, crops, strict=True)]
+        surface = Surface(*(self._join(surfaces, name) for name in Surface.__annotations__))
+        transport = Transport(*(self._join(lights, name) for name in Transport.__annotations__))
+        pixel = np.concatenate([at + i * self._size**2 for i, (_, at) in enumerate(crops)])
+        eyes = self._views.c2w[[view for view, _ in keys], :3, 3]
+        azimuth, elevation = np.arctan2(eyes[:, 1], eyes[:, 0]), np.arcsin(eyes[:, 2] / np.linalg.norm(eyes, axis=1))
+        where = torch.from_numpy(pixel).to(self._device)
+        images = Images(self._batch, self._size, where, surface, azimuth, elevation)
+        return Sample(surface.points, surface.normals, 1, transport, tuple(keys), images=images)
+
+    def prefetch(self, generator: torch.Generator) -> None:
+        self._views.prefetch(self._keys(generator))
+
+    def _keys(self, generator: torch.Generator) -> list[tuple[int, int]]:
+        """(view, environment) of each image: the first numbers that a step draws."""
+        seen = self._views.seen
+        view = torch.randint(len(seen), (self._batch,), generator=generator).tolist()
+        environment = torch.randint(len(self._views.environments), (self._batch,), generator=generator).tolist()
+        return [(seen[v], e) for v, e in zip(view, environment, strict=True)]
+
+    def _crop(self, view: int, generator: torch.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Rows of the view's object pixels that a random crop shows, and their flat place in the square: (K,) each."""
+        views, size = self._views, self._size
+        whole = len(self._strides) < 2 or float(torch.rand((), generator=generator)) < WHOLE_VIEW_SHARE
+        stride = self._strides[0 if whole else int(torch.randint(1, len(self._strides), (), generator=generator))]
+        pixels = views.pixels(view)
+        hit = np.array(np.divmod(pixels[int(torch.randint(len(pixels), (), generator=generator))], views.width))
+        centre = np.array([views.height, views.width]) // 2 if whole else hit
+        first = centre - stride * (size // 2)
+        first = first + (hit - first) % stride  # the lattice passes through an object pixel
+        row, column = (first[axis] + stride * np.arange(size) for axis in (0, 1))
+        inside = ((row >= 0) & (row < views.height))[:, None] & (column >= 0) & (column < views.width)  # (S, S)
+        flat = row[:, None] * views.width + column
+        rows = np.searchsorted(pixels, flat).clip(max=len(pixels) - 1)
+        shown = inside & (pixels[rows] == flat)
+        return rows[shown].astype(np.int64), np.flatnonzero(shown)
+
+    def _join(self, parts: list, name: str) -> Tensor:  # type: ignore[type-arg]
+        return torch.cat([getattr(part, name) for part in parts]).to(self._device)
+
+
+class PixelSampler:
+    """Loose object pixels of all views, each under every environment at once.
+
+    The pool holds all of them, or as many of each view as the byte budget allows, chosen at random.
+
+    points, normals, eyes: (M, 3) world; eyes are the cameras' positions.
+    """
+
+    def __init__(self, views: Views, count: int, generator: torch.Generator, device: torch.device) -> None:
+        self._count, self.device = count, device
+        share = min(1.0, CACHE_BYTES / _pool_bytes(views))
+        rows = [_subset(len(views.pixels(view)), share, generator) for view in views.seen]
+        surfaces = [views.surface(view, chosen) for view, chosen in zip(views.seen, rows, strict=True)]
+        self.points, self.normals = (torch.cat([getattr(s, name) for s in surfaces]) for name in ("points", "normals"))
+        eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
+        self.eyes = torch.from_numpy(eyes.astype(np.float32))
+        self._lights = _pooled_lights(views, rows)  # (M, L, WIDTH)
+
+    def draw(self, generator: torch.Generator) -> Sample:
+        return self.at(torch.randint(len(self.points), (self._count,), generator=generator))
+
+    def at(self, rows: Tensor) -> Sample:
+        """The sample of given rows (P,) of the pool."""
+        points, normals, lights = (t.index_select(0, rows) for t in (self.points, self.normals, self._lights))
+        packed = lights.to(self.device).float().flatten(0, 1)
+        transport = Transport.unpack(packed)
+        device = self.device
+        return Sample(points.to(device), normals.to(device), lights.shape[1], transport, rows=rows)
+
+    def prefetch(self, generator: torch.Generator) -> None:
+        """Nothing to do: the pool is in memory."""
+
+
+def _pool_bytes(views: Views) -> int:
+    per_pixel = 2 * WIDTH * len(views.environments)
+    return per_pixel * sum(len(views.pixels(view)) for view in views.seen)
+
+
+def _subset(count: int, share: float, generator: torch.Generator) -> NDArray[np.int64]:
+    """Ascending indices of a random share of `count` things, one at least."""
+    chosen = torch.randperm(count, generator=generator)[: max(1, int(count * share))]
+    return chosen.sort().values.numpy()
+
+
+def _pooled_lights(views: Views, rows: list[NDArray[np.int64]]) -> Tensor:
+    """Packed transport of the chosen rows of every view under every environment: (M, L, WIDTH) float16."""
+    starts = np.cumsum([0, *map(len, rows)])
+    pool = torch.empty(int(starts[-1]), len(views.environments), WIDTH, dtype=torch.half)
+
+    def fill(job: tuple[int, int]) -> None:
+        i, environment = job
+        transport = views.read_transport((views.seen[i], environment))[torch.from_numpy(rows[i])]
+        pool[starts[i] : starts[i + 1], environment] = transport.packed()
+
+    jobs = [(i, e) for i in range(len(views.seen)) for e in range(len(views.environments))]
+    with ThreadPoolExecutor(READERS) as readers:
+        list(readers.map(fill, jobs))
+    return pool

@@ -1,0 +1,238 @@
+"""The distill stage: a conditions folder and a prompt (or a reference) in, a material field out."""
+
+import contextlib
+import math
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stages.core.artifact import Provenance, peek, plain_options, run_log, save_npz, write_text
+from stages.core.errors import InputError, NumericalError
+from stages.core.field import FieldConfig, MaterialField
+from stages.core.progress import Progress, silent
+from stages.core.schemas import MATERIAL
+from stages.core.shading import Material, shade
+from stages.distill import checkpoint, regularizers, schedule
+from stages.distill.checkpoint import State, step_generator
+from stages.distill.guidance.base import Guidance
+from stages.distill.optimizer import RowAdam
+from stages.distill.options import DistillOptions
+from stages.distill.preview import write_preview
+from stages.distill.sampling import CropSampler, PixelSampler, Sample
+from stages.distill.views import Views
+
+SEEN_BY = 3
+"""A surface point is taken to be seen by one view in this many."""
+
+
+@dataclass(frozen=True)
+class DistillResult:
+    """What a run did: steps in all, of which `resumed` were found in a checkpoint; last loss; already up to date."""
+
+    steps: int
+    resumed: int
+    loss: float
+    up_to_date: bool
+
+
+def distill(
+    conditions: Path, out: Path, options: DistillOptions, force: bool = False, progress: Progress = silent
+) -> DistillResult:
+    """Optimise a material field until its renderings under all views and lights please the guidance.
+
+    Writes `out` (material.npz), `<stem>.curve.csv` and `<stem>.preview.png` beside it, and while it runs `<out>.checkpoint`,
+    from which the same call continues.
+
+    Raises: InputError, ArtifactError, OutputError, NumericalError; KeyboardInterrupt after saving a checkpoint.
+    """
+    device = _device(options)
+    views = Views(conditions)
+    guidance = make_guidance(options, views, device)
+    request = _request(options, views, guidance)
+    if not force and (done := peek(out, MATERIAL)) and done.same_request(request):
+        checkpoint.checkpoint_path(out).unlink(missing_ok=True)
+        return DistillResult(options.steps, 0, math.nan, True)
+    with run_log(out) as log:
+        state = new_state(options, views, device)
+        resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
+        clock = Clock(state.seconds[-1] if resumed else 0.0)
+        _run(out, state, guidance, views, options, request, clock, progress)
+        _write(out, state, views, request)
+        write_preview(_beside(out, "preview.png"), views, state.field, device)
+        log |= {"milliseconds_per_step": clock.per_step(state.step - resumed), "steps": state.step, "resumed": resumed}
+    checkpoint.checkpoint_path(out).unlink(missing_ok=True)
+    return DistillResult(state.step, resumed, state.loss[-1], False)
+
+
+def make_guidance(options: DistillOptions, views: Views, device: torch.device) -> Guidance:
+    """The guidance that the options name. Raises: InputError, ArtifactError."""
+    if options.guidance == "reference":
+        from stages.distill.guidance import reference
+
+        if options.reference is None:
+            raise InputError("--guidance reference: no model is given; add --reference MODEL.glb")
+        asset = reference.ReferenceAsset(options.reference, views.to_world)
+        chosen = step_generator(options.seed, options.steps)  # a generator that no step uses
+        pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device)
+        return reference.ReferenceGuidance(asset, pool)
+    if options.guidance == "prior":
+        from stages.distill.guidance import prior
+        from stages.prior.model import load_prior
+
+        if not options.prompt.strip():
+            raise InputError("--prompt: empty; say what the object is made of, such as \"weathered bronze\"")
+        model = load_prior(device)
+        return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device), options)
+    raise InputError(f"--guidance {options.guidance}: unknown; expected prior or reference")
+
+
+def new_state(options: DistillOptions, views: Views, device: torch.device) -> State:
+    """Field and optimiser before the first step; the finest cells are as far apart as the surface points that all views see."""
+    spacing = views.pixel_size() / math.sqrt(max(1.0, len(views.seen) / SEEN_BY))
+    field = MaterialField(FieldConfig.for_detail(spacing), torch.Generator().manual_seed(options.seed)).to(device)
+    return State(field, RowAdam(dict(field.named_parameters()), tables=frozenset({"table"})))
+
+
+def _run(
+    out: Path,
+    state: State,
+    guidance: Guidance,
+    views: Views,
+    options: DistillOptions,
+    request: Provenance,
+    clock: "Clock",
+    progress: Progress,
+) -> None:
+    """Do the steps that are left, with a checkpoint now and then and when interrupted."""
+    saved = time.perf_counter()
+    with checkpoint.interruptions() as interrupted:
+        try:
+            while state.step < options.steps:
+                loss = optimisation_step(state, guidance, views, options, clock)
+                state.loss.append(loss)
+                state.seconds.append(clock.elapsed())
+                progress(f"distill (loss {loss:.4f})", state.step, options.steps)
+                if interrupted():
+                    raise KeyboardInterrupt
+                if time.perf_counter() - saved > checkpoint.SECONDS:
+                    checkpoint.save(out, state, request)
+                    write_preview(_beside(out, "preview.png"), views, state.field, state.field.table.device)
+                    saved = time.perf_counter()
+        except KeyboardInterrupt:
+            checkpoint.save(out, state, request)
+            raise
+
+
+def optimisation_step(
+    state: State, guidance: Guidance, views: Views, options: DistillOptions, clock: "Clock"
+) -> float:
+    """One step: draw, shade, ask the guidance, update. Returns: the guidance's number for the curve."""
+    share = state.step / options.steps
+    generator = step_generator(options.seed, state.step)
+    with clock("data"):
+        sample = guidance.sampler.draw(generator)
+        guidance.sampler.prefetch(step_generator(options.seed, state.step + 1))
+    with clock("field"):
+        material, regularizer = _material(state.field, sample, options, share, generator)
+    with clock("shading"):
+        radiance = shade(sample.transport, material)
+    with clock("guidance"):
+        gradient, loss = guidance.gradient(radiance.detach(), sample, share, generator)
+    if not (math.isfinite(loss) and bool(torch.isfinite(gradient).all())):
+        raise NumericalError(_not_finite(state.step, sample, views, options.seed))
+    with clock("backward"):
+        losses = [radiance] if regularizer is None else [radiance, regularizer]
+        torch.autograd.backward(losses, [gradient, None][: len(losses)])
+    with clock("optimiser"):
+        state.optimizer.step(options.learning_rate * schedule.learning_rate(share))
+    return loss
+
+
+def _material(
+    field: MaterialField, sample: Sample, options: DistillOptions, share: float, generator: torch.Generator
+) -> tuple[Material, Tensor | None]:
+    """The material of a sample's points, and the weighted losses on the material itself, if any."""
+    bimodal = options.bimodal * schedule.bimodal(share)
+    if options.smoothness == 0:
+        material = field(sample.points)
+        return material, bimodal * regularizers.bimodality(material.metallic) if bimodal else None
+    moved = regularizers.displaced(sample.points, sample.normals, generator)
+    both = field(torch.cat([sample.points, moved]))
+    parts = [Material(*(values.chunk(2)[i] for values in (both.albedo, both.roughness, both.metallic))) for i in (0, 1)]
+    loss = options.smoothness * regularizers.smoothness(*parts) + bimodal * regularizers.bimodality(parts[0].metallic)
+    return parts[0], loss
+
+
+class Clock:
+    """Seconds by part of a step, and in all, counted on from an interrupted run."""
+
+    def __init__(self, before: float = 0.0) -> None:
+        self._start = time.perf_counter() - before
+        self._parts: dict[str, float] = defaultdict(float)
+
+    @contextlib.contextmanager
+    def __call__(self, part: str) -> Iterator[None]:
+        """Count the block's time towards a part."""
+        start = time.perf_counter()
+        yield
+        self._parts[part] += time.perf_counter() - start
+
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return time.perf_counter() - self._start
+
+    def per_step(self, steps: int) -> dict[str, float]:
+        """Milliseconds of each part, mean over the steps that were done here."""
+        return {part: round(1000 * seconds / max(steps, 1), 3) for part, seconds in self._parts.items()}
+
+
+def _not_finite(step: int, sample: Sample, views: Views, seed: int) -> str:
+    where = ", ".join(f"view {v} under {views.environments[e]}" for v, e in sample.source) or "pixels of all views"
+    return f"step {step}: the gradient is not finite ({where}, seed {seed}); try a smaller --learning-rate"
+
+
+def _device(options: DistillOptions) -> torch.device:
+    """The torch device asked for, if it works. Raises: InputError."""
+    if options.steps < 1 or options.batch < 1:
+        raise InputError(f"--steps {options.steps} --batch {options.batch}: expected 1 or more")
+    try:
+        device = torch.device(options.device)
+        torch.empty(1, device=device)
+    except (RuntimeError, AssertionError) as error:
+        cause = str(error).splitlines()[0][:100]
+        raise InputError(f"--device {options.device}: cannot be used ({cause}); expected cpu or cuda") from error
+    return device
+
+
+def _request(options: DistillOptions, views: Views, guidance: Guidance) -> Provenance:
+    chosen = plain_options(options)
+    chosen["reference"] = options.reference.name if options.reference else None
+    return Provenance(chosen, options.seed, {"conditions": views.digest, **guidance.inputs}, {
+        "prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments,
+    })
+
+
+def _beside(out: Path, ending: str) -> Path:
+    return out.with_name(f"{out.stem}.{ending}")
+
+
+def _write(out: Path, state: State, views: Views, request: Provenance) -> None:
+    """Write the curve, then material.npz."""
+    lines = [f"{i},{t:.3f},{loss:.6g}" for i, (t, loss) in enumerate(zip(state.seconds, state.loss, strict=True), 1)]
+    write_text(_beside(out, "curve.csv"), "step,seconds,loss\n" + "\n".join(lines) + "\n")
+    arrays = {
+        **state.field.to_arrays(),
+        "curve_step": np.arange(1, state.step + 1, dtype=np.int32),
+        "curve_loss": np.array(state.loss, np.float32),
+        "c2w": views.c2w,
+        "fov_y": views.fov_y,
+        "size": np.array([views.width, views.height], np.int32),
+    }
+    extra = {**request.extra, "field": state.field.config_dict()}
+    save_npz(out, MATERIAL, arrays, Provenance(request.options, request.seed, request.inputs, extra))

@@ -1,0 +1,79 @@
+"""The slow, obvious light transport: float64 quadrature over every texel of the light, for a handful of points.
+
+Each texel is cut into subdivision x subdivision cells; at each cell's centre the bilinear radiance, the BRDF and a
+shadow ray are evaluated and summed. Nothing is sampled, split, filtered or shared. A mirror (roughness 0) is a delta
+and is looked up once.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from stages.core.brdf import alpha_from_roughness
+from stages.core.shading import F0, KNOTS, Transport
+from stages.light.environment import Environment, directions_of_texels, lookup
+from stages.light.gbuffer import GBuffer
+from stages.light.scene import Scene
+
+
+def reference_transport(
+    scene: Scene, points: GBuffer, environment: Environment, subdivision: int, pixels: NDArray
+) -> Transport:
+    """E, A and B of some points of a view.
+
+    Args:
+        subdivision: cells along each side of a texel; the error falls with its square, and a lobe is resolved when a
+        cell is smaller than alpha / 4. pixels: (N,) rows of `points`.
+    Returns:
+        Transport of N points, float64.
+    """
+    height, width, _ = environment.radiance.shape
+    directions, row_angle = directions_of_texels(height * subdivision, width * subdivision)
+    angle = np.repeat(row_angle, width * subdivision)
+    wi = directions.reshape(-1, 3)
+    light = lookup(environment.radiance, wi)  # (D, 3)
+    lit = light.any(-1)
+    wi, light = wi[lit], light[lit] * angle[lit, None]
+    terms = [_point(scene, points, environment, int(i), wi, light) for i in pixels]
+    E, A, B = (torch.from_numpy(np.stack(parts)) for parts in zip(*terms, strict=True))
+    cosine = torch.from_numpy((points.n[pixels].astype(np.float64) * points.wo[pixels]).sum(-1))
+    return Transport(E, A, B, cosine)
+
+
+def _point(
+    scene: Scene, points: GBuffer, environment: Environment, i: int, wi: NDArray, light: NDArray
+) -> tuple[NDArray, NDArray, NDArray]:
+    n, wo = points.n[i].astype(np.float64), points.wo[i].astype(np.float64)
+    above = wi @ n > 0
+    wi, light = wi[above], light[above]
+    origin = np.broadcast_to(points.origin[i], wi.shape)
+    visible = ~scene.occluded(origin, wi)
+    wi, light = wi[visible], light[visible]
+    n_l, n_v = wi @ n, float(wo @ n)
+    wm = wi + wo
+    wm = wm / np.linalg.norm(wm, axis=-1, keepdims=True)
+    n_h, s = wm @ n, (1 - wm @ wo) ** 5
+    diffuse = (1 - (F0 + (1 - F0) * s)) * n_l / np.pi
+    E = diffuse @ light
+    A, B = np.zeros((2, len(KNOTS), 3))
+    for k, roughness in enumerate(KNOTS):
+        if roughness == 0:
+            A[k], B[k] = _mirror(scene, environment, points.origin[i], n, wo)
+            continue
+        a2 = alpha_from_roughness(roughness) ** 2
+        sin2 = (np.cross(wm, n) ** 2).sum(-1)
+        D = a2 / (np.pi * (sin2 + a2 * n_h**2) ** 2)
+        lambda_o, lambda_i = (0.5 * (np.sqrt(1 + a2 * (1 - c**2) / c**2) - 1) for c in (n_v, n_l))
+        f = D / (1 + lambda_o + lambda_i) / (4 * n_v)
+        A[k], B[k] = ((1 - s) * f) @ light, (s * f) @ light
+    return E, A, B
+
+
+def _mirror(
+    scene: Scene, environment: Environment, origin: NDArray, n: NDArray, wo: NDArray
+) -> tuple[NDArray, NDArray]:
+    n_v = float(wo @ n)
+    wi = (2 * n_v * n - wo)[None]
+    radiance = lookup(environment.radiance, wi)[0] * (not scene.occluded(origin[None], wi)[0])
+    s = (1 - n_v) ** 5
+    return (1 - s) * radiance, s * radiance

@@ -1,0 +1,94 @@
+"""The working mesh as Embree sees it: closest hits, occlusion, and where a secondary ray may start.
+
+A miss is a mask, never a distance. Rays are float32; the mesh is the normalised one, about 1 across, so that one offset
+in world units serves every source scale.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+from numpy.typing import NDArray
+
+OFFSET = 2e-5
+"""Distance by which a secondary ray's origin is lifted off the surface, in world units (object size 1)."""
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Closest hits of R rays: mask (R,), ray parameter t (R,), triangle (R,) or -1, barycentric (R, 3)."""
+
+    mask: NDArray[np.bool_]
+    t: NDArray[np.float32]
+    triangle: NDArray[np.int32]
+    barycentric: NDArray[np.float32]
+
+
+class Scene:
+    """A triangle mesh ready for ray queries; safe to use from several threads, which run in parallel.
+
+    Args:
+        vertices: (V, 3) float32 world. triangles: (F, 3) int32. normals: (F, 3, 3) float32 unit, per corner.
+    """
+
+    def __init__(self, vertices: NDArray, triangles: NDArray, normals: NDArray) -> None:
+        self.vertices = np.ascontiguousarray(vertices, np.float32)
+        self.triangles = np.ascontiguousarray(triangles, np.int32)
+        self.normals = np.ascontiguousarray(normals, np.float32)
+        self._embree = EmbreeScene(robust=True)
+        self._mesh = TriangleMesh(self._embree, self.vertices, self.triangles)
+        self.occluded(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the tree, once
+
+    def intersect(self, origins: NDArray, directions: NDArray) -> Hits:
+        """Closest hit of each ray. Args: (R, 3) each; directions need not be unit: t is in their length."""
+        o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
+        hit = self._embree.run(o, d, query="INTERSECT", output=True)
+        mask = hit["primID"] >= 0
+        u, v = np.where(mask, hit["u"], 0), np.where(mask, hit["v"], 0)
+        barycentric = np.stack([1 - u - v, u, v], -1).astype(np.float32)
+        return Hits(mask, np.where(mask, hit["tfar"], 0).astype(np.float32), hit["primID"], barycentric)
+
+    def occluded(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
+        """Whether anything lies along each ray, at any distance. Args: (R, 3) each."""
+        o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
+        return self._embree.run(o, d, query="OCCLUDED") >= 0
+
+    def geometric_normal(self, triangle: NDArray) -> NDArray[np.float32]:
+        """Unit normal of each triangle, by its winding. Args: (P,). Returns: (P, 3); zero for a degenerate one."""
+        a, b, c = (self.vertices[self.triangles[triangle, k]].astype(np.float64) for k in range(3))
+        normal = np.cross(b - a, c - a)
+        length = np.linalg.norm(normal, axis=-1, keepdims=True)
+        return (normal / np.where(length > 0, length, 1)).astype(np.float32)
+
+    def point(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
+        """World position on each triangle. Args: (P,), (P, 3). Returns: (P, 3)."""
+        corners = self.vertices[self.triangles[triangle]].astype(np.float64)  # (P, 3, 3)
+        return np.einsum("pk,pkd->pd", barycentric, corners).astype(np.float32)
+
+    def shading_normal(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
+        """Unit interpolated normal; the triangle's own where the corners' cancel out. Returns: (P, 3)."""
+        n = np.einsum("pk,pkd->pd", barycentric, self.normals[triangle].astype(np.float64))
+        length = np.linalg.norm(n, axis=-1, keepdims=True)
+        flat = self.geometric_normal(triangle)
+        return np.where(length > 1e-3, n / np.where(length > 1e-3, length, 1), flat).astype(np.float32)
+
+    def ray_origin(self, triangle: NDArray, barycentric: NDArray, side: NDArray) -> NDArray[np.float32]:
+        """Where rays that leave a surface point start: on the smooth surface that the normals describe, lifted off.
+
+        On a coarse mesh with smooth normals a ray from the flat triangle hits the mesh's own facets near the shadow
+        terminator. The origin is moved onto the average of the corner tangent planes, where they lie outside.
+        Source: Hanika 2021, "Hacking the Shadow Terminator", Ray Tracing Gems II, ch. 4.
+
+        Args:
+            triangle, barycentric: (P,), (P, 3). side: (P,) +1 or -1, the side of the winding's normal to leave from.
+        Returns:
+            (P, 3) float32.
+        """
+        b = np.asarray(barycentric, np.float64)
+        corners = self.vertices[self.triangles[triangle]].astype(np.float64)  # (P, 3, 3)
+        normals = self.normals[triangle].astype(np.float64) * side[:, None, None]
+        p = np.einsum("pk,pkd->pd", b, corners)
+        below = np.minimum(np.einsum("pkd,pkd->pk", p[:, None] - corners, normals), 0.0)  # (P, 3)
+        smooth = p - np.einsum("pk,pk,pkd->pd", b, below, normals)
+        return (smooth + OFFSET * side[:, None] * self.geometric_normal(triangle)).astype(np.float32)

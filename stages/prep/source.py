@@ -1,0 +1,94 @@
+"""The source mesh as its file has it: numbers, faces and UV set untouched, so that `bake` can give them back.
+
+A *loop* is one corner of one face, in the order of the file. Readers repair nothing; they refuse, with one line, what
+they cannot take literally.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.core.errors import InputError
+from stages.core.frames import transform_points
+
+IDENTITY = tuple(float(x) for x in np.eye(4).reshape(-1))
+
+
+@dataclass(frozen=True)
+class Part:
+    """The faces of one material slot on one node. transform: node to source frame, 16 numbers, row by row."""
+
+    name: str
+    material: str = ""
+    node: str = ""
+    transform: tuple[float, ...] = IDENTITY
+
+
+@dataclass(frozen=True)
+class Source:
+    """A mesh file's content.
+
+    vertices: (SV, 3) float64 as in the file. uv: (ST, 2) float64. normals: (SN, 3) float32.
+    loop_start: (P + 1,) int32; face p has loops loop_start[p] .. loop_start[p + 1] - 1.
+    loop_vertex, loop_uv, loop_normal: (L,) int32 rows of the above; -1 where a loop has no UV or normal.
+    face_part: (P,) int32 rows of parts. v_down: whether v = 0 is the top of the image.
+    skipped: what the file holds besides triangles and polygons, with its count.
+    """
+
+    format: str
+    vertices: NDArray[np.float64]
+    uv: NDArray[np.float64]
+    normals: NDArray[np.float32]
+    loop_start: NDArray[np.int32]
+    loop_vertex: NDArray[np.int32]
+    loop_uv: NDArray[np.int32]
+    loop_normal: NDArray[np.int32]
+    face_part: NDArray[np.int32]
+    parts: list[Part]
+    v_down: bool = False
+    skipped: dict[str, int] = field(default_factory=dict)
+
+    def placed_vertices(self) -> NDArray[np.float64]:
+        """(SV, 3) vertices with node transforms applied; an unreferenced vertex stays as it is."""
+        placed = self.vertices.copy()
+        part_of_vertex = np.full(len(placed), -1)
+        part_of_vertex[self.loop_vertex] = self.loop_part()
+        for index, part in enumerate(self.parts):
+            if part.transform != IDENTITY:
+                mine = part_of_vertex == index
+                with np.errstate(invalid="ignore", over="ignore"):
+                    placed[mine] = transform_points(np.reshape(part.transform, (4, 4)), placed[mine])
+        return placed
+
+    def loop_part(self) -> NDArray[np.int32]:
+        """(L,) the part of each loop."""
+        return np.repeat(self.face_part, np.diff(self.loop_start))
+
+
+def polygons(lengths: NDArray, vertices: int, loop_vertex: NDArray, path: Path) -> tuple[NDArray, NDArray]:
+    """loop_start and loop_vertex as int32, checked.
+
+    Args:
+        lengths: (P,) corners of each face. vertices: how many there are. loop_vertex: (L,) indices, flat.
+    Raises: InputError when there is no face or an index points at no vertex.
+    """
+    if vertices == 0 or len(lengths) == 0:
+        raise InputError(
+            f"{path}: {vertices} vertices and {len(lengths)} faces, expected a surface; export the mesh again"
+        )
+    check_range(loop_vertex, vertices, "vertex", path)
+    start = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
+    return start, np.asarray(loop_vertex).astype(np.int32)
+
+
+def check_range(index: NDArray, count: int, what: str, path: Path) -> None:
+    """Raises: InputError when an index is outside 0 .. count - 1."""
+    wrong = (index < 0) | (index >= count)
+    if wrong.any():
+        found = int(np.asarray(index)[wrong][0])
+        raise InputError(
+            f"{path}: a face refers to {what} {found} (counted from 0), but the file has {count}; "
+            "the file is damaged or cut off, export it again"
+        )

@@ -1,0 +1,186 @@
+"""The `prep` stage: from a mesh file to `prep.npz`."""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.core.artifact import Provenance, peek, plain_options, run_log, save_npz, sha256_file
+from stages.core.errors import InputError
+from stages.core.progress import Progress, silent
+from stages.core.schemas import PREP
+from stages.prep.normals import authored, face_normals, shading_normals
+from stages.prep.options import PrepOptions
+from stages.prep.orient import outward
+from stages.prep.read_gltf import companions, read_gltf
+from stages.prep.read_obj import read_obj
+from stages.prep.read_off import read_off
+from stages.prep.read_ply import read_ply
+from stages.prep.read_stl import read_stl
+from stages.prep.repair import Working, repair
+from stages.prep.source import Source
+from stages.prep.topology import components, edges
+from stages.prep.unwrap import unwrap
+from stages.prep.uv import loop_uvs, signed_area, unusable, uv_charts
+
+READERS: dict[str, Callable[[Path], Source]] = {
+    ".obj": read_obj, ".ply": read_ply, ".stl": read_stl, ".off": read_off, ".glb": read_gltf, ".gltf": read_gltf,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PrepResult:
+    """up_to_date: whether nothing had to be done. findings: what was found and mended."""
+
+    up_to_date: bool
+    findings: dict[str, Any]
+
+
+def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progress: Progress = silent) -> PrepResult:
+    """Make a mesh ready: read, mend, orient, give it normals and UVs, and write it beside its untouched source.
+
+    Raises: InputError, OutputError.
+    """
+    request = Provenance(plain_options(options), None, _inputs(mesh))
+    made = None if force else peek(out, PREP)
+    if made is not None and made.same_request(request):
+        return PrepResult(True, made.extra["findings"])
+    with run_log(out):
+        progress("read", 0, 4)
+        source = READERS[mesh.suffix.lower()](mesh)
+        progress("mend", 1, 4)
+        working = repair(source, options.up, options.weld_tolerance, mesh)
+        normals, findings = _orient(source, working, options.crease_angle)
+        progress("unwrap", 2, 4)
+        loop_uv, kept, layout = _texture(source, working, options, mesh)
+        uv = loop_uv[working.loops]
+        chart = uv_charts(working.triangles, uv)
+        findings = _findings(source, working, findings, layout) | {
+            "charts": int(chart.max()) + 1,
+            "texel_density": _texel_density(working, uv, options.texture_size),
+        }
+        progress("write", 3, 4)
+        extra = {
+            "source_format": source.format,
+            "source_name": mesh.name,
+            "uv_kept": kept,
+            "parts": [asdict(part) for part in source.parts],
+            "findings": findings,
+        }
+        arrays = _arrays(source, working, normals, uv, chart, loop_uv)
+        save_npz(out, PREP, arrays, Provenance(request.options, None, request.inputs, extra))
+        progress("write", 4, 4)
+    return PrepResult(False, findings)
+
+
+def _inputs(mesh: Path) -> dict[str, str]:
+    """SHA-256 of the mesh and of the files that it is spread over."""
+    suffix = mesh.suffix.lower()
+    if suffix not in READERS:
+        raise InputError(f"{mesh}: format '{suffix}' is not read; expected one of {', '.join(READERS)}")
+    if mesh.is_dir():
+        raise InputError(f"{mesh}: is a folder; expected a mesh file")
+    inputs = {"mesh": sha256_file(mesh)}
+    if mesh.stat().st_size == 0:
+        raise InputError(f"{mesh}: is empty; export the mesh again")
+    if suffix == ".gltf":
+        inputs |= {f"mesh:{uri}": sha256_file(path) for uri, path in companions(mesh).items()}
+    return inputs
+
+
+def _orient(source: Source, working: Working, crease_angle: float) -> tuple[NDArray, dict[str, Any]]:
+    """Turn faces outward, in place; shading normals (F, 3, 3) and what was found."""
+    winding = outward(working.vertices, working.triangles)
+    turn = winding.flip[:, None]
+    working.triangles = np.where(turn, working.triangles[:, [0, 2, 1]], working.triangles)
+    working.loops = np.where(turn, working.loops[:, [0, 2, 1]], working.loops)
+    given = authored(source, working.loops, working.to_world)
+    normals, kept = shading_normals(given, working.vertices, working.triangles, winding.patch, crease_angle)
+    return normals, {
+        "inverted_winding": int(winding.flip.sum()),
+        "non_orientable_edges": winding.non_orientable,
+        "corners": int(working.loops.size),
+        "authored_normals": kept,
+    }
+
+
+def _texture(
+    source: Source, working: Working, options: PrepOptions, path: Path
+) -> tuple[NDArray[np.float32], bool, dict[str, Any]]:
+    """UVs of all source loops (L, 2), whether they are the source's, and how they came about."""
+    own = loop_uvs(source)
+    _, area = face_normals(working.vertices, working.triangles)
+    problem = "new ones asked for" if options.uv == "new" else unusable(own[working.loops], area)
+    if problem is None:
+        return _everywhere(own, working), True, {"unusable_uv": None, "unwrap": "kept", "gutter": None}
+    if options.uv == "keep":
+        raise InputError(f"{path}: its UVs cannot be kept: {problem}; mend them or let new ones be made")
+    polygon = np.searchsorted(source.loop_start, working.loops[:, 0], "right") - 1
+    seconds = options.unwrap_seconds if len(polygon) <= options.unwrap_triangles else 0.0
+    layout = unwrap(
+        working.vertices, working.triangles, polygon, options.texture_size, options.padding, seconds
+    )  # fmt: skip
+    made = np.full((len(source.loop_vertex), 2), np.nan, np.float32)
+    made[working.loops] = layout.uv
+    how = {"unusable_uv": problem, "unwrap": layout.method, "gutter": layout.packing.gutter}
+    return _everywhere(made, working), False, how
+
+
+def _everywhere(uv: NDArray, working: Working) -> NDArray[np.float32]:
+    """(L, 2) UVs where loops without finite ones (of faces left out) take their stand-in's; 0 where there is none."""
+    replaced = ~np.isfinite(uv).all(1) & (working.stand_in >= 0)
+    result = np.where(replaced[:, None], uv[np.maximum(working.stand_in, 0)], uv)
+    return np.nan_to_num(result, nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _findings(source: Source, working: Working, more: dict[str, Any], layout: dict[str, Any]) -> dict[str, Any]:
+    """What was found in the source and what was done about it, flat."""
+    faces = edges(working.triangles).faces
+    joints = np.concatenate([working.triangles[:, :2], working.triangles[:, 1:]])
+    parts = int(components(len(working.vertices), joints).max()) + 1
+    return {
+        "vertices": len(source.vertices),
+        "faces": len(source.face_part),
+        "welded_vertices": len(working.vertices),
+        "triangles": len(working.triangles),
+        "parts": parts,
+        "watertight": bool((faces == 2).all()),
+        "boundary_edges": int((faces == 1).sum()),
+        "non_manifold_edges": int((faces > 2).sum()),
+        **working.findings,
+        **more,
+        **layout,
+        "skipped": source.skipped,
+    }
+
+
+def _texel_density(working: Working, uv: NDArray, texture_size: int) -> float:
+    """Texels per unit of length in the world frame, from the areas of all faces together."""
+    _, area = face_normals(working.vertices, working.triangles)
+    return round(texture_size * float(np.sqrt(np.abs(signed_area(uv)).sum() / area.sum())), 3)
+
+
+def _arrays(
+    source: Source, working: Working, normals: NDArray, uv: NDArray, chart: NDArray, loop_uv: NDArray
+) -> dict[str, NDArray]:
+    return {
+        "vertices": working.vertices.astype(np.float32),
+        "triangles": working.triangles,
+        "normals": normals,
+        "uv": np.clip(uv, 0.0, 1.0),
+        "charts": chart,
+        "triangle_loops": working.loops,
+        "to_world": working.to_world,
+        "source_vertices": source.vertices,
+        "source_uv": source.uv,
+        "source_normals": source.normals,
+        "loop_start": source.loop_start,
+        "loop_vertex": source.loop_vertex,
+        "loop_source_uv": source.loop_uv,
+        "loop_source_normal": source.loop_normal,
+        "face_part": source.face_part,
+        "loop_uv": loop_uv,
+    }

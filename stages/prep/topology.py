@@ -1,0 +1,56 @@
+"""Edges of a triangle list and what hangs together over them; `ids` may be vertices, or (vertex, UV) pairs.
+
+Half-edge 3 f + k of face f runs from its corner k to corner (k + 1) % 3.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+
+@dataclass(frozen=True)
+class Edges:
+    """edge: (3 F,) undirected edge of each half-edge. forward: (3 F,) whether it runs from the lower id. faces: (E,)
+    how many half-edges share each edge. pairs: (M, 2) the two half-edges of each edge that has exactly two."""
+
+    edge: NDArray[np.int64]
+    forward: NDArray[np.bool_]
+    faces: NDArray[np.int64]
+    pairs: NDArray[np.int64]
+
+
+def edges(ids: NDArray) -> Edges:
+    """Edges of triangles `ids` (F, 3)."""
+    start, end = ids.reshape(-1).astype(np.int64), np.roll(ids, -1, 1).reshape(-1).astype(np.int64)
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    _, edge, faces = np.unique(low * (high.max(initial=0) + 1) + high, return_inverse=True, return_counts=True)
+    order = np.argsort(edge, kind="stable")
+    first = np.cumsum(faces) - faces
+    two = first[faces == 2]
+    return Edges(edge, start < end, faces, np.stack([order[two], order[two + 1]], -1))
+
+
+def components(count: int, links: NDArray) -> NDArray[np.int32]:
+    """Labels (count,) of what is linked, numbered by their first member. links: (K, 2)."""
+    graph = coo_matrix((np.ones(len(links), np.int8), (links[:, 0], links[:, 1])), shape=(count, count))
+    labels = connected_components(graph, directed=False)[1]
+    return renumber(labels)
+
+
+def renumber(labels: NDArray) -> NDArray[np.int32]:
+    """Labels numbered 0, 1, ... in the order of their first appearance."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), np.int32)
+    rank[np.argsort(first, kind="stable")] = np.arange(len(first), dtype=np.int32)
+    return rank[inverse]
+
+
+def face_components(ids: NDArray) -> NDArray[np.int32]:
+    """Labels (F,) of faces that hang together over any shared edge."""
+    table = edges(ids)
+    order = np.argsort(table.edge, kind="stable")
+    same = table.edge[order[1:]] == table.edge[order[:-1]]
+    return components(len(ids), np.stack([order[:-1][same], order[1:][same]], -1) // 3)

@@ -1,0 +1,172 @@
+"""New UVs: charts by xatlas within a time limit, or by direction; checked, mended, and packed with gutters.
+
+Whatever made the charts, three things hold of the result: no chart covers itself, triangles of one source polygon
+share a chart, and charts stand two paddings apart.
+"""
+
+import subprocess
+import sys
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.prep import charts, xatlas_worker
+from stages.prep.normals import face_normals
+from stages.prep.overlap import overlapping
+from stages.prep.pack import Packing, pack
+from stages.prep.stitch import stitch
+from stages.prep.topology import face_components, renumber
+from stages.prep.uv import signed_area, uv_vertices
+
+_POOR = 0.2  # share of the texture that charts fill, below which the other way of making charts is tried too
+_ROUNDS = 24  # of splitting charts that cover themselves
+
+
+@dataclass(frozen=True)
+class Layout:
+    """chart: (F,) from 0. method: what made the charts. packing: UVs, scale and gutter."""
+
+    chart: NDArray[np.int32]
+    method: str
+    packing: Packing
+
+    @property
+    def uv(self) -> NDArray[np.float32]:
+        """(F, 3, 2)."""
+        return self.packing.uv
+
+
+def unwrap(
+    vertices: NDArray, triangles: NDArray, polygon: NDArray, texture_size: int, padding: int, seconds: float
+) -> Layout:
+    """UVs for a mesh that has none.
+
+    Args:
+        vertices: (V, 3) world. triangles: (F, 3). polygon: (F,) source face of each. texture_size, padding: texels.
+        seconds: what xatlas may take; 0 does without it.
+    """
+    polygon = renumber(polygon)
+    made, method = run_xatlas(vertices, triangles, seconds) if seconds > 0 else (None, "projection: the mesh is large")
+    if made is not None:
+        flat, chart = _whole_polygons(vertices, triangles, polygon, *made)
+        flat = _to_scale(vertices[triangles], flat, chart)
+        layout = _lay_out(vertices, triangles, polygon, flat, chart, texture_size, padding, method)
+        if np.abs(signed_area(layout.uv)).sum() > _POOR:
+            return layout
+    chart = charts.grow(vertices, triangles, polygon)
+    flat = charts.project(vertices, triangles, chart)
+    if made is None:
+        return _lay_out(vertices, triangles, polygon, flat, chart, texture_size, padding, method)
+    method = "projection: denser than xatlas's many charts"
+    other = _lay_out(vertices, triangles, polygon, flat, chart, texture_size, padding, method)
+    return max(layout, other, key=_merit)
+
+
+def _lay_out(
+    vertices: NDArray, triangles: NDArray, polygon: NDArray, flat: NDArray, chart: NDArray,
+    texture_size: int, padding: int, method: str,
+) -> Layout:  # fmt: skip
+    """Mend charts, join neighbours unless that packs worse, and pack."""
+    flat, chart = _mend(vertices, triangles, polygon, flat, chart)
+    apart = Layout(chart, method, pack(flat, triangles, chart, texture_size, padding))
+    flat, chart = stitch(flat, triangles, chart, texture_size, padding)
+    joined = Layout(chart, method, pack(flat, triangles, chart, texture_size, padding))
+    return max(joined, apart, key=_merit)
+
+
+def _merit(layout: Layout) -> tuple[int, float]:
+    """What makes one layout better than another: the gutter asked for, then texels."""
+    return layout.packing.gutter, layout.packing.texels_per_unit
+
+
+def run_xatlas(vertices: NDArray, triangles: NDArray, seconds: float) -> tuple[tuple[NDArray, NDArray] | None, str]:
+    """Charts by xatlas in a process of its own: ((F, 3, 2) in units of length, (F,) chart or -1) or None, and how."""
+    with tempfile.TemporaryDirectory() as folder:
+        request, answer = Path(folder) / "mesh.npz", Path(folder) / "charts.npz"
+        np.savez(request, vertices=vertices.astype(np.float32), triangles=triangles.astype(np.uint32))
+        command = [sys.executable, xatlas_worker.__file__, str(request), str(answer)]
+        try:
+            subprocess.run(command, timeout=seconds, check=True, capture_output=True)
+            with np.load(answer, allow_pickle=False) as result:
+                return (result["uv"].astype(np.float64), result["chart"]), "xatlas"
+        except subprocess.TimeoutExpired:
+            return None, f"projection: xatlas took more than {seconds:g} s"
+        except (subprocess.CalledProcessError, OSError, zipfile.BadZipFile, KeyError):
+            return None, "projection: xatlas failed"
+
+
+def _to_scale(corners: NDArray, flat: NDArray, chart: NDArray) -> NDArray[np.float64]:
+    """Charts stretched in x and y so that edges have their length in space, as nearly as each chart allows.
+
+    xatlas rounds a chart's width and height to whole texels of its own. Least squares of dx^2 a + dy^2 b = length^2.
+    """
+    space, plane = ((np.roll(points, -1, 1) - points) ** 2 for points in (corners, flat))
+    length, dx, dy = space.sum(-1), plane[..., 0], plane[..., 1]
+    xx, xy, yy, xl, yl = (
+        np.bincount(chart, term.sum(1)) for term in (dx * dx, dx * dy, dy * dy, dx * length, dy * length)
+    )
+    determinant = xx * yy - xy * xy
+    solvable = determinant > 1e-6 * xx * yy
+    safe = np.where(solvable, determinant, 1.0)
+    a, b = (xl * yy - yl * xy) / safe, (yl * xx - xl * xy) / safe
+    solvable &= (a > 0.25) & (a < 4) & (b > 0.25) & (b < 4)
+    stretch = np.where(solvable[:, None], np.sqrt(np.where(solvable[:, None], np.stack([a, b], -1), 1.0)), 1.0)
+    return flat * stretch[chart][:, None]
+
+
+def _whole_polygons(
+    vertices: NDArray, triangles: NDArray, polygon: NDArray, flat: NDArray, chart: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Polygons that lie in several charts, or in none, or have lost their area, become charts of their own."""
+    count = int(polygon.max()) + 1
+    low, high = np.full(count, chart.max() + 1), np.full(count, -1)
+    np.minimum.at(low, polygon, chart)
+    np.maximum.at(high, polygon, chart)
+    broken = (low != high) | (low < 0)
+    lost = ~np.isfinite(flat).all((1, 2)) | (signed_area(np.nan_to_num(flat)) == 0)
+    broken[polygon[lost]] = True
+    own = broken[polygon]
+    chart = np.where(own, int(chart.max()) + 1 + polygon, chart)
+    chart = renumber(chart)
+    flat = np.where(own[:, None, None], charts.project(vertices, triangles, chart), flat)
+    return flat, chart
+
+
+def _mend(
+    vertices: NDArray, triangles: NDArray, polygon: NDArray, flat: NDArray, chart: NDArray
+) -> tuple[NDArray, NDArray]:
+    """Split charts that cover themselves and project the pieces, until none is left that can be split."""
+    flat, chart = flat.copy(), renumber(chart)
+    rows = np.arange(len(chart))
+    for _ in range(_ROUNDS):
+        own = renumber(chart[rows])
+        bad = overlapping(flat[rows], own)
+        rows = rows[bad[own]]
+        if not len(rows):
+            break
+        pieces = _split(vertices, triangles[rows], polygon[rows], renumber(chart[rows]))
+        flat[rows] = charts.project(vertices, triangles[rows], pieces)
+        chart[rows] = int(chart.max()) + 1 + pieces
+    return flat, renumber(chart)
+
+
+def _split(vertices: NDArray, triangles: NDArray, polygon: NDArray, chart: NDArray) -> NDArray[np.int32]:
+    """Each chart cut in two where its polygons differ most in place and direction; pieces hang together."""
+    normal, area = face_normals(vertices, triangles)
+    order = np.argsort(chart, kind="stable")
+    second = np.zeros(len(chart), np.int64)
+    for faces in np.split(order, np.searchsorted(chart[order], np.arange(1, int(chart.max()) + 1))):
+        place = vertices[triangles[faces]].mean(1)
+        features = np.concatenate([place, normal[faces] * np.linalg.norm(np.ptp(place, axis=0))], -1)
+        _, member = np.unique(polygon[faces], return_inverse=True)
+        weight = np.bincount(member, area[faces])
+        features = np.stack([np.bincount(member, area[faces] * column) / weight for column in features.T], -1)
+        features -= np.average(features, axis=0, weights=weight)
+        along = features @ np.linalg.svd(features * weight[:, None] ** 0.5, full_matrices=False)[2][0]
+        second[faces] = (along > 0)[member]
+    sides = np.broadcast_to((2 * chart + second)[:, None, None], (len(chart), 3, 2))
+    return face_components(uv_vertices(triangles, sides))  # a vertex on both sides counts as two

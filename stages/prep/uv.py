@@ -1,0 +1,101 @@
+"""UVs: the source's per loop, whether they can be baked, and the charts they form. v is up, [0, 1] the unit square."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.prep.source import Source
+from stages.prep.topology import face_components
+
+OVERLAP = 1e-3
+"""Largest share of covered texels that more than one face may claim."""
+
+_EDGE = 1e-5  # how far outside the unit square a kept UV may lie: 1/50 texel at 2048
+_RASTER = 2048  # texels across, for measuring overlap
+_NEGLIGIBLE = 1e-6  # share of the surface that may have UVs without area: slivers, not a missing layout
+
+
+def loop_uvs(source: Source) -> NDArray[np.float32]:
+    """(L, 2) the source's UVs with v up; NaN where a loop has none. A v that is up already keeps its bits."""
+    if not len(source.uv):
+        return np.full((len(source.loop_vertex), 2), np.nan, np.float32)
+    with np.errstate(over="ignore"):
+        uv = source.uv[np.maximum(source.loop_uv, 0)].astype(np.float32)
+    if source.v_down:
+        uv[:, 1] = (1.0 - uv[:, 1].astype(np.float64)).astype(np.float32)
+    uv[source.loop_uv < 0] = np.nan
+    return uv
+
+
+def unusable(uv: NDArray, area: NDArray) -> str | None:
+    """Why the UVs cannot be baked, or None.
+
+    Args:
+        uv: (F, 3, 2), NaN where missing. area: (F,) of the faces in space.
+    """
+    if np.isnan(uv).all():
+        return "none in the file"
+    bad = ~np.isfinite(uv).all((1, 2))
+    if bad.any():
+        return f"{int(bad.sum())} of {len(uv)} faces have none"
+    outside = ((uv < -_EDGE) | (uv > 1 + _EDGE)).any((1, 2))
+    if outside.any():
+        return f"{int(outside.sum())} of {len(uv)} faces lie outside the unit square"
+    flat = signed_area(uv) == 0
+    if area[flat].sum() > _NEGLIGIBLE * area.sum():
+        return f"{int(flat.sum())} of {len(uv)} faces have no area in UV"
+    share = overlap(uv)
+    return f"{100 * share:.3g} % of the covered texels overlap" if share >= OVERLAP else None
+
+
+def signed_area(uv: NDArray) -> NDArray[np.float64]:
+    """(F,) areas in UV, positive when counter-clockwise with v up."""
+    a, b, c = (uv[:, k].astype(np.float64) for k in range(3))
+    u, v = b - a, c - a
+    return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
+
+
+def overlap(uv: NDArray) -> float:
+    """Share of covered texels that more than one face covers; 1 when no texel is covered at all."""
+    cover = coverage(uv.astype(np.float64) * _RASTER, _RASTER, _RASTER)
+    covered = int((cover > 0).sum())
+    return float((cover > 1).sum()) / covered if covered else 1.0
+
+
+def coverage(points: NDArray, height: int, width: int) -> NDArray[np.int32]:
+    """How many triangles cover each texel's centre, (height, width); faces that share an edge never both cover a texel.
+
+    Scan conversion by differences: along a row, a face begins (+1) at the first centre right of its left edge and
+    ends (-1) at the first right of its right edge. An edge's crossings do not depend on the face, so neighbours meet
+    exactly.
+
+    Args:
+        points: (F, 3, 2) in texels, row 0 at y = 0.
+    """
+    facing = np.sign(signed_area(points))
+    start, end = points.reshape(-1, 2), np.roll(points, -1, 1).reshape(-1, 2)
+    upward = (end[:, 1] > start[:, 1])[:, None]
+    low, high = np.where(upward, start, end), np.where(upward, end, start)
+    first, last = (np.clip(np.ceil(side[:, 1] - 0.5), 0, height).astype(np.int64) for side in (low, high))
+    counts = last - first
+    edge = np.repeat(np.arange(len(counts)), counts)
+    row = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts) + first[edge]
+    slope = np.divide(high[:, 0] - low[:, 0], high[:, 1] - low[:, 1], out=np.zeros(len(low)), where=counts > 0)
+    x = low[edge, 0] + (row + 0.5 - low[edge, 1]) * slope[edge]
+    column = np.clip(np.ceil(x - 0.5), 0, width).astype(np.int64)
+    step = np.where(upward[:, 0], -1.0, 1.0)[edge] * np.repeat(facing, 3)[edge]
+    change = np.bincount(row * (width + 1) + column, step, height * (width + 1)).reshape(height, width + 1)
+    return np.cumsum(change[:, :-1].astype(np.int32), axis=1, dtype=np.int32)
+
+
+def uv_charts(triangles: NDArray, uv: NDArray) -> NDArray[np.int32]:
+    """(F,) labels of faces that hang together over edges with the same vertices and UVs on both sides."""
+    return face_components(uv_vertices(triangles, uv))
+
+
+def uv_vertices(triangles: NDArray, uv: NDArray) -> NDArray[np.int64]:
+    """(F, 3) one number for each distinct (vertex, UV bits) pair."""
+    bits = np.ascontiguousarray(uv.astype(np.float32) + np.float32(0)).view(np.uint32).reshape(-1, 2)
+    packed = bits[:, 0].astype(np.uint64) << np.uint64(32) | bits[:, 1]
+    _, code = np.unique(packed, return_inverse=True)
+    pairs = triangles.reshape(-1).astype(np.int64) * (int(code.max(initial=0)) + 1) + code
+    return np.unique(pairs, return_inverse=True)[1].reshape(-1, 3)

@@ -1,0 +1,195 @@
+"""Text encoder of the prior: shipped word vectors, and a small transformer trained with the diffusion model.
+
+A word that the table lacks takes the vector of its stem, of the two words it is made of, or of the table's words that
+are spelt most alike; so every prompt has an embedding, and it is a function of the prompt alone.
+"""
+
+import functools
+import re
+import unicodedata
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from stages.core.artifact import Field, Schema, load_npz
+
+VOCABULARY = Schema(
+    "dreammat.vocabulary",
+    1,
+    {
+        "words": Field("u1", ("B",)),  # ASCII, one word a line, sorted
+        "vectors": Field("i1", ("W", "D")),  # unit word vectors divided by scale
+        "scale": Field("f4", ()),
+    },
+)
+
+WEIGHTS_FOLDER = Path(__file__).parent / "weights"
+
+MAX_WORDS = 24
+"""A prompt's words beyond this are not read."""
+
+SKIPPED = frozenset({"a", "an", "the", "of", "is"})
+"""Words that say nothing about a material."""
+
+SUFFIXES = ("s", "es", "ed", "d", "ing", "y", "ish", "en", "er", "like", "ic", "ly", "ized", "ised", "ness")
+
+ALIKE = 0.35
+"""Least overlap of character trigrams (Jaccard) for two words to count as spelt alike."""
+
+
+class Vocabulary:
+    """Word vectors by word. words: sorted. vectors: (W, D) float32, unit length."""
+
+    def __init__(self, words: list[str], vectors: NDArray[np.float32]) -> None:
+        self.index = {word: i for i, word in enumerate(words)}
+        self.vectors = vectors
+        self._known: dict[str, NDArray[np.float32]] = {}
+
+    @classmethod
+    def load(cls, path: Path) -> "Vocabulary":
+        """Read the shipped table. Raises: ArtifactError."""
+        table = load_npz(path, VOCABULARY)
+        words = table["words"].tobytes().decode("ascii").split("\n")
+        return cls(words, table["vectors"].astype(np.float32) * table["scale"])
+
+    def vector(self, word: str) -> NDArray[np.float32]:
+        """(D,) of any word; zero for one that resembles nothing in the table."""
+        if word not in self._known:
+            self._known[word] = self._look_up(word)
+        return self._known[word]
+
+    def _look_up(self, word: str) -> NDArray[np.float32]:
+        parts = self._exact(word) or self._stem(word) or self._compound(word)
+        if parts:
+            return self.vectors[parts].mean(0)
+        return self._spelt_alike(word)
+
+    def _exact(self, word: str) -> list[int]:
+        return [self.index[word]] if word in self.index else []
+
+    def _stem(self, word: str) -> list[int]:
+        for suffix in sorted(SUFFIXES, key=len, reverse=True):
+            stem = word.removesuffix(suffix)
+            if stem != word and len(stem) >= 3:
+                doubled = stem[:-1] if stem[-1] == stem[-2] else stem
+                for candidate in (stem, stem + "e", stem + "y", doubled):
+                    if candidate in self.index:
+                        return [self.index[candidate]]
+        return []
+
+    def _compound(self, word: str) -> list[int]:
+        for cut in sorted(range(3, len(word) - 2), key=lambda c: abs(2 * c - len(word))):
+            if word[:cut] in self.index and word[cut:] in self.index:
+                return [self.index[word[:cut]], self.index[word[cut:]]]
+        return []
+
+    def _spelt_alike(self, word: str) -> NDArray[np.float32]:
+        grams = trigrams(word)
+        overlap = {i: len(grams & other) / len(grams | other) for i, other in self._trigrams() if grams & other}
+        best = sorted(overlap, key=lambda i: (-overlap[i], i))[:3]
+        near = [i for i in best if overlap[i] >= ALIKE]
+        return self.vectors[near].mean(0) if near else np.zeros_like(self.vectors[0])
+
+    @functools.cache  # noqa: B019  (one table lives as long as the process)
+    def _trigrams(self) -> list[tuple[int, frozenset[str]]]:
+        return [(i, trigrams(word)) for word, i in self.index.items()]
+
+    def encode(self, prompts: list[str]) -> tuple[Tensor, Tensor]:
+        """Word vectors of each prompt.
+
+        Returns:
+            vectors: (B, MAX_WORDS, D) float32, zero after a prompt's end; present: (B, MAX_WORDS) bool.
+        """
+        vectors = np.zeros((len(prompts), MAX_WORDS, self.vectors.shape[1]), np.float32)
+        present = np.zeros((len(prompts), MAX_WORDS), bool)
+        for i, prompt in enumerate(prompts):
+            for k, word in enumerate(split_words(prompt)[:MAX_WORDS]):
+                vectors[i, k], present[i, k] = self.vector(word), True
+        return torch.from_numpy(vectors), torch.from_numpy(present)
+
+
+def split_words(prompt: str) -> list[str]:
+    """Lower-case words without accents, digits and articles."""
+    plain = unicodedata.normalize("NFKD", prompt.lower()).encode("ascii", "ignore").decode()
+    return [word for word in re.findall("[a-z]+", plain) if word not in SKIPPED]
+
+
+def trigrams(word: str) -> frozenset[str]:
+    """Character trigrams of a word with its ends marked."""
+    marked = f"^{word}$"
+    return frozenset(marked[i : i + 3] for i in range(len(marked) - 2))
+
+
+@dataclass(frozen=True)
+class TextEmbedding:
+    """What the network reads of B prompts. tokens: (B, L, W); present: (B, L) bool; pooled: (B, W)."""
+
+    tokens: Tensor
+    present: Tensor
+    pooled: Tensor
+
+    def expand(self, count: int) -> "TextEmbedding":
+        """One prompt's embedding, `count` times."""
+        return TextEmbedding(*(part.expand(count, *part.shape[1:]) for part in self.parts()))
+
+    def parts(self) -> tuple[Tensor, Tensor, Tensor]:
+        """The three tensors."""
+        return self.tokens, self.present, self.pooled
+
+    @staticmethod
+    def cat(embeddings: list["TextEmbedding"]) -> "TextEmbedding":
+        """Several batches as one."""
+        return TextEmbedding(*(torch.cat(parts) for parts in zip(*(e.parts() for e in embeddings), strict=True)))
+
+
+class TextEncoder(nn.Module):
+    """A transformer over word vectors; its first token stands for the whole prompt, and for the empty one.
+
+    `expected` turns that token into the material the words call for, on average: albedo (linear), roughness, metallic.
+    """
+
+    def __init__(self, dims: int = 64, width: int = 128, layers: int = 2, heads: int = 4) -> None:
+        super().__init__()
+        self.project = nn.Linear(dims, width)
+        self.whole = nn.Parameter(torch.randn(1, 1, width) * 0.02)
+        self.position = nn.Parameter(torch.randn(1, MAX_WORDS + 1, width) * 0.02)
+        self.blocks = nn.ModuleList(TextBlock(width, heads) for _ in range(layers))
+        self.norm = nn.LayerNorm(width)
+        self.expect = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 5))
+
+    def forward(self, vectors: Tensor, present: Tensor) -> TextEmbedding:
+        """Args: as `Vocabulary.encode` returns them, on the module's device."""
+        whole = self.whole.expand(len(vectors), -1, -1)
+        x = torch.cat([whole, self.project(vectors * vectors.shape[-1] ** 0.5)], 1) + self.position
+        present = torch.cat([torch.ones_like(present[:, :1]), present], 1)  # (B, L)
+        for block in self.blocks:
+            x = block(x, present)
+        x = self.norm(x)
+        return TextEmbedding(x, present, x[:, 0])
+
+    def expected(self, embedding: TextEmbedding) -> Tensor:
+        """(B, 5) in (0, 1): albedo (3), roughness, metallic; the mean over the materials that the prompt fits."""
+        return torch.sigmoid(self.expect(embedding.pooled))
+
+
+class TextBlock(nn.Module):
+    """Pre-norm self-attention and MLP."""
+
+    def __init__(self, width: int, heads: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.norm_1, self.norm_2 = nn.LayerNorm(width), nn.LayerNorm(width)
+        self.qkv, self.out = nn.Linear(width, 3 * width), nn.Linear(width, width)
+        self.mlp = nn.Sequential(nn.Linear(width, 2 * width), nn.GELU(), nn.Linear(2 * width, width))
+
+    def forward(self, x: Tensor, present: Tensor) -> Tensor:
+        """Args: x (B, L, W); present (B, L), tokens that may be attended to."""
+        b, length, width = x.shape
+        q, k, v = self.qkv(self.norm_1(x)).view(b, length, 3, self.heads, -1).permute(2, 0, 3, 1, 4)
+        mixed = nn.functional.scaled_dot_product_attention(q, k, v, attn_mask=present[:, None, None, :])
+        x = x + self.out(mixed.transpose(1, 2).reshape(b, length, width))
+        return x + self.mlp(self.norm_2(x))

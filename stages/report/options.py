@@ -1,0 +1,15 @@
+"""What `dreammat report` can be told."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """Options of the conditions report."""
+
+    size: int = 256
+    """pixels along each side of the view that is measured"""
+    env: tuple[str, ...] = ()
+    """as for `conditions`; empty for the five built-in environments"""
+    seed: int = 0
+    """of the camera and of the measured rays; the converged result uses another"""

@@ -1,0 +1,143 @@
+"""Batches for training: stored transport, mixed and tinted, shaded with fresh materials.
+
+A batch is a function of seed and step alone, so a resumed run sees what an uninterrupted one would have seen.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.random import Generator, default_rng
+from numpy.typing import NDArray
+from torch import Tensor
+
+from stages.core.artifact import load_npz
+from stages.core.color import srgb_encode
+from stages.core.shading import KNOTS, Material, Transport, light_maps, shade
+from stages.prior.profile import SIZE, exposure, prepare, profile_tone
+from stages.train.materials import Surface, mean_parameters, random_material
+from stages.train.render import SHARD
+
+
+@dataclass(frozen=True)
+class Batch:
+    """B pictures and what they show.
+
+    image: (B, 3, S, S) as the model sees it. conditions: (B, 22, S, S). mask: (B, 1, S, S), 0 or 1.
+    material: (B, 5, S, S) sRGB albedo, roughness, metallic. captions: B texts. mean: (B, 5) of the material.
+    """
+
+    image: Tensor
+    conditions: Tensor
+    mask: Tensor
+    material: Tensor
+    captions: list[str]
+    mean: Tensor
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One stored picture: where the object is, its surface and its transport under each light (P, L, 19, 3) float16."""
+
+    mask: NDArray[np.bool_]
+    depth: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    surface: Surface
+    transport: NDArray[np.float16]
+    cosine: NDArray[np.float32]
+
+
+class Tiles:
+    """All tiles of some shards, in memory."""
+
+    def __init__(self, paths: list[Path]) -> None:
+        self.shards = [load_npz(path, SHARD).arrays for path in paths]
+        self.where = [(s, t) for s, shard in enumerate(self.shards) for t in range(len(shard["mask"]))]
+
+    def __len__(self) -> int:
+        return len(self.where)
+
+    def __getitem__(self, index: int) -> Tile:
+        shard, tile = self.shards[self.where[index][0]], self.where[index][1]
+        part = slice(shard["start"][tile], shard["start"][tile + 1])
+        surface = Surface(*(shard[name][part] for name in ("point", "normal", "convexity", "occlusion")))
+        normal = surface.normal @ shard["to_view"][tile].T
+        light = shard["transport"][part], shard["cosine"][part]
+        return Tile(shard["mask"][tile], shard["depth"][tile], normal, surface, *light)
+
+
+class PictureBatches(torch.utils.data.Dataset):
+    """Batch number `step` of a run, by index."""
+
+    def __init__(self, tiles: Tiles, size: int, seed: int) -> None:
+        self.tiles, self.size, self.seed = tiles, size, seed
+
+    def __getitem__(self, step: int) -> Batch:
+        rng = default_rng([self.seed, 1, step])
+        pictures = [picture(self.tiles[int(rng.integers(len(self.tiles)))], rng) for _ in range(self.size)]
+        captions, means, images = zip(*pictures, strict=True)
+        return assemble(list(captions), torch.stack(means), torch.from_numpy(np.stack(images)), rng)
+
+
+class CaptionBatches(torch.utils.data.Dataset):
+    """Captions and the mean materials (B, 5) they go with; batch number `step` of a run."""
+
+    def __init__(self, size: int, seed: int) -> None:
+        self.size, self.seed = size, seed
+
+    def __getitem__(self, step: int) -> tuple[list[str], Tensor]:
+        rng = default_rng([self.seed, 2, step])
+        materials = [random_material(rng) for _ in range(self.size)]
+        means = np.stack([mean_parameters(material, rng, 48) for material in materials])
+        return [material.caption for material in materials], torch.from_numpy(means)
+
+
+CHANNELS = {"mask": 1, "depth": 1, "normal": 3, "lights": 18, "radiance": 3, "material": 5}
+"""Channels of a picture as `picture` lays them out."""
+
+
+def picture(tile: Tile, rng: Generator) -> tuple[str, Tensor, NDArray[np.float32]]:
+    """One tile under a random light with a random material.
+
+    Returns:
+        caption, mean material (5,), channels (31, S, S) as `CHANNELS`, zero off the object.
+    """
+    transport = random_transport(tile.transport, tile.cosine, rng)
+    material = random_material(rng)
+    values = material.evaluate(tile.surface)  # (P, 5)
+    parameters = torch.from_numpy(values)
+    radiance = shade(transport, Material(parameters[:, :3], parameters[:, 3], parameters[:, 4]))
+    encoded = np.concatenate([srgb_encode(values[:, :3]), values[:, 3:]], 1)  # (P, 5)
+    lights = light_maps(transport).reshape(len(values), 18).numpy()
+    ones = np.ones((len(values), 1), np.float32)
+    flat = np.concatenate([ones, tile.depth[tile.mask][:, None], tile.normal, lights, radiance.numpy(), encoded], 1)
+    dense = np.zeros((flat.shape[1], SIZE, SIZE), np.float32)
+    dense[:, tile.mask] = flat.T
+    if rng.random() < 0.5:  # a mirrored world is as good
+        dense = dense[..., ::-1].copy()
+        dense[2] *= -1
+    return material.caption, torch.from_numpy(encoded.mean(0)), dense
+
+
+def random_transport(stored: NDArray[np.float16], cosine: NDArray[np.float32], rng: Generator) -> Transport:
+    """One of the tile's lights or two of them, each in a random colour; light is linear, so this is a light, too."""
+    picks = rng.permutation(stored.shape[1])[: 1 + int(rng.random() < 0.5)]
+    mixed = sum(stored[:, k].astype(np.float32) * random_gain(rng) for k in picks)
+    values = torch.from_numpy(mixed)  # (P, 19, 3)
+    k = len(KNOTS)
+    return Transport(values[:, 0], values[:, 1 : 1 + k], values[:, 1 + k :], torch.from_numpy(cosine))
+
+
+def random_gain(rng: Generator) -> NDArray[np.float32]:
+    """Intensity and tint of a light, (3,)."""
+    return np.exp(rng.normal(0, 0.6) + rng.normal(0, 0.12, 3)).astype(np.float32)
+
+
+def assemble(captions: list[str], means: Tensor, dense: Tensor, rng: Generator) -> Batch:
+    """Pictures as the model wants them. Args: dense (B, 31, S, S) as `CHANNELS`."""
+    mask, depth, normal, lights, radiance, material = dense.split(list(CHANNELS.values()), 1)
+    jitter = torch.from_numpy(np.exp(rng.normal(0, 0.25, (len(captions), 1, 1, 1))).astype(np.float32))
+    exposed = exposure(lights, mask) * jitter
+    conditions = prepare(depth, normal, mask, lights * exposed)
+    return Batch(profile_tone(radiance * exposed), conditions, mask, material, captions, means)

@@ -1,0 +1,234 @@
+"""Random materials with captions: every point's albedo, roughness and metallic, and words that say what it is.
+
+A material is a base coat, or two coats and where the second lies: trim on the edges, top and base, spots, stripes,
+patches, crevices. It reads the surface by height, normal, convexity and occlusion, never by UV.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from stages.core.color import srgb_decode, srgb_encode
+from stages.train.captions import Words, caption, pick, pick_weighted
+from stages.train.patterns import PATTERNS, fbm, noise, placement
+from stages.train.substances import COLORS, FINISHES, FINISHES_METAL, METALS, SUBSTANCES, Substance
+
+SHARES = np.cumsum([s.weight for s in SUBSTANCES])[:-1] / sum(s.weight for s in SUBSTANCES)
+"""Upper end of each substance's share of [0, 1), but the last's."""
+
+LEVEL_PATTERNS = ("bricks", "strata")
+COLOR_WORDS = tuple(COLORS)
+SHARED_FINISH = 0.45
+"""Share of coats that a finish word describes."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Points of a shape. point, normal: (P, 3) world. convexity: (P,), -1 in a crease to 1 on an edge.
+
+    occlusion: (P,), share of the hemisphere that is blocked.
+    """
+
+    point: NDArray[np.float32]
+    normal: NDArray[np.float32]
+    convexity: NDArray[np.float32]
+    occlusion: NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Coat:
+    """One substance as drawn. color: sRGB (3,) at the pattern's zero; second: sRGB (3,) at its one.
+
+    scale: pattern units per object size. turn, shift: the pattern's placement.
+    """
+
+    words: Words
+    color: NDArray
+    second: NDArray
+    roughness: float
+    roughness_spread: float
+    metallic: float
+    pattern: str
+    scale: float
+    turn: NDArray
+    shift: NDArray
+
+    def evaluate(self, surface: Surface) -> NDArray[np.float32]:
+        """(P, 5): linear albedo (3), roughness, metallic."""
+        p = (surface.point * self.scale) @ self.turn.T + self.shift
+        value = PATTERNS[self.pattern](p)[:, None]
+        color = np.clip(self.color + (self.second - self.color) * value, 0.012, 0.985)
+        roughness = np.clip(self.roughness + self.roughness_spread * value, 0.0, 1.0)
+        metallic = np.full_like(roughness, self.metallic)
+        return np.concatenate([srgb_decode(color), roughness, metallic], 1).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the second coat lies. kind: one of `KINDS`. amount: share or level, [0, 1]. shift: (3,) of its noise."""
+
+    kind: str
+    amount: float
+    frequency: float
+    axis: NDArray
+    shift: NDArray
+
+
+@dataclass(frozen=True)
+class RandomMaterial:
+    """A caption and the coats behind it."""
+
+    caption: str
+    coats: tuple[Coat, ...]
+    layout: Layout | None
+
+    def evaluate(self, surface: Surface) -> NDArray[np.float32]:
+        """(P, 5): linear albedo (3), roughness, metallic."""
+        base = self.coats[0].evaluate(surface)
+        if self.layout is None:
+            return base
+        cover = coverage(self.layout, surface)[:, None]
+        return base + (self.coats[1].evaluate(surface) - base) * cover
+
+
+KINDS = (("edges", 0.2), ("top", 0.22), ("spots", 0.14), ("stripes", 0.14), ("patches", 0.12), ("crevices", 0.18))
+"""Ways to lay a second coat, with their shares."""
+
+
+def random_material(rng: Generator, composed: float = 0.25) -> RandomMaterial:
+    """Draw a material. composed: share of materials with two coats."""
+    base = draw_coat(rng, draw_substance(rng))
+    if rng.random() >= composed:
+        return RandomMaterial(caption(rng, base.words, None, None), (base,), None)
+    kind = pick_weighted(rng, KINDS)
+    second = draw_coat(rng, second_substance(rng, kind))
+    layout = Layout(kind, rng.uniform(0, 1), rng.uniform(0.6, 1.8), rng.normal(size=3), rng.uniform(0, 32, 3))
+    return RandomMaterial(caption(rng, base.words, second.words, kind), (base, second), layout)
+
+
+def draw_substance(rng: Generator) -> Substance:
+    """A substance by its share."""
+    return SUBSTANCES[int(np.searchsorted(SHARES, rng.random(), side="right"))]
+
+
+def second_substance(rng: Generator, kind: str) -> Substance:
+    """What lies on top: in crevices mostly what gathers there, on edges mostly metal."""
+    if kind == "crevices" and rng.random() < 0.7:
+        gathers = [s for s in SUBSTANCES if s.names[0] in ("moss", "rust", "dirt", "verdigris", "snow")]
+        return gathers[rng.integers(len(gathers))]
+    if kind == "edges" and rng.random() < 0.5:
+        return METALS[rng.integers(len(METALS))]
+    return draw_substance(rng)
+
+
+def draw_coat(rng: Generator, substance: Substance) -> Coat:
+    """Draw a substance's colour, finish and pattern, with the words that tell them."""
+    color, color_word = draw_color(rng, substance)
+    roughness = rng.uniform(*substance.roughness)
+    pattern, contrast, spread, finish = substance.pattern, substance.contrast, 0.08, ""
+    if rng.random() < SHARED_FINISH:
+        finish, roughness = draw_finish(rng, substance)
+        pattern = "streaks" if finish == "brushed" else pattern
+    wear = rng.random()
+    worn = wear < 0.12
+    if worn:
+        condition, lift, spread = WORN[rng.integers(len(WORN))]
+        roughness, contrast = min(roughness + lift, 1.0), contrast + 0.12
+        finish = condition if not finish else f"{condition} {finish}"
+    lightness = contrast * rng.uniform(0.5, 1.2) * (0.35 + 0.65 * float(color.mean()))
+    second = color - lightness * 0.5 * (1 + rng.normal(0, 0.12, 3)) * (-1 if rng.random() < 0.15 else 1)
+    if pattern in ("veins", "bricks", "cells"):  # their negative side is the dark one
+        second = 2 * color - second
+    turn, shift = placement(rng, pattern in LEVEL_PATTERNS)
+    scale = float(np.exp(rng.uniform(np.log(1.5), np.log(6))))
+    words = Words(pick(rng, substance.names), color_word, finish, substance.family)
+    spread *= rng.uniform(0.2, 1)
+    return Coat(words, color, second, roughness, spread, substance.metallic, pattern, scale, turn, shift)
+
+
+WORN = (
+    # word, what it adds to roughness, how much roughness then varies
+    ("worn", 0.12, 0.2), ("scratched", 0.08, 0.2), ("old", 0.12, 0.15), ("dusty", 0.25, 0.12), ("weathered", 0.2, 0.18),
+    ("dirty", 0.15, 0.2), ("aged", 0.12, 0.15), ("grimy", 0.12, 0.2),
+)
+
+
+def draw_color(rng: Generator, substance: Substance) -> tuple[NDArray, str]:
+    """sRGB (3,) and the word for it, empty when it goes without saying."""
+    if substance.paintable and rng.random() < 0.8:
+        word = pick(rng, COLOR_WORDS)
+        return vary(rng, hex_color(COLORS[word]), 0.035), word
+    first, second = pick(rng, substance.colors), pick(rng, substance.colors)
+    if substance.paintable:
+        return vary(rng, hex_color(first), 0.03), nearest_color(first)
+    mixed = hex_color(first) + (hex_color(second) - hex_color(first)) * rng.random()
+    return vary(rng, mixed, 0.01 if substance.metallic else 0.025), ""
+
+
+def draw_finish(rng: Generator, substance: Substance) -> tuple[str, float]:
+    """A finish word that suits the substance, and the roughness it means."""
+    table = FINISHES_METAL if substance.metallic else FINISHES
+    words = list(table)
+    if substance.family in ("fabric", "paper", "rust"):
+        words = [word for word in words if table[word][0] >= 0.35]
+    word = pick(rng, words)
+    return word, float(rng.uniform(*table[word]))
+
+
+def vary(rng: Generator, color: NDArray, amount: float) -> NDArray:
+    """A colour nearby: lightness and each channel shifted a little."""
+    return np.clip(color + rng.normal(0, amount) + rng.normal(0, amount * 0.6, 3), 0.02, 0.98)
+
+
+@functools.lru_cache(maxsize=1024)
+def hex_color(text: str) -> NDArray:
+    """(3,) in [0, 1] of "#rrggbb"."""
+    return np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
+
+
+@functools.lru_cache(maxsize=1024)
+def nearest_color(text: str) -> str:
+    """The colour name whose sRGB is nearest to that of "#rrggbb"."""
+    return min(COLORS, key=lambda word: float(((hex_color(COLORS[word]) - hex_color(text)) ** 2).sum()))
+
+
+def coverage(layout: Layout, surface: Surface) -> NDArray[np.float32]:
+    """Share of the second coat at each point, (P,) in [0, 1]; its borders are narrow."""
+    p = surface.point
+    wobble = fbm(p * 5 + layout.shift, 2)
+    if layout.kind == "edges":
+        return ramp(surface.convexity + 0.06 * wobble, 0.22 + 0.15 * layout.amount, 0.06)
+    if layout.kind == "top":
+        return ramp(p[:, 2] + 0.02 * wobble, 0.24 * (layout.amount - 0.5), 0.012)
+    if layout.kind == "spots":
+        return ramp(noise(p * 7 * layout.frequency + layout.shift), 0.2 + 0.25 * layout.amount, 0.06)
+    if layout.kind == "stripes":
+        axis = layout.axis if layout.amount < 0.4 else np.array([0.0, 0, 1])
+        phase = p @ (axis / np.linalg.norm(axis)) * 26 * layout.frequency
+        return ramp(np.sin(phase + layout.shift[0]), 0.0, 0.15)
+    if layout.kind == "patches":
+        return ramp(fbm(p * 2.2 * layout.frequency + layout.shift, 4), 0.25 * layout.amount, 0.06)
+    hidden = np.maximum(surface.occlusion - 0.25, -surface.convexity * 0.9)
+    return ramp(hidden + 0.15 * wobble, 0.12 + 0.1 * layout.amount, 0.08)
+
+
+def ramp(x: NDArray, edge: float, width: float) -> NDArray:
+    """0 below the edge, 1 above, a straight ramp of twice the width between."""
+    return np.clip((x - edge) / (2 * width) + 0.5, 0, 1).astype(np.float32)
+
+
+def mean_parameters(material: RandomMaterial, rng: Generator, count: int = 96) -> NDArray[np.float32]:
+    """(5,) mean sRGB albedo, roughness, metallic over points of a stand-in surface; what the text encoder learns."""
+    normal = rng.normal(size=(count, 3))
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    surface = Surface(
+        rng.uniform(-0.5, 0.5, (count, 3)).astype(np.float32),
+        normal.astype(np.float32),
+        rng.uniform(-0.5, 0.8, count).astype(np.float32),
+        rng.uniform(0, 0.6, count).astype(np.float32),
+    )
+    values = material.evaluate(surface)
+    return np.concatenate([srgb_encode(values[:, :3]), values[:, 3:]], 1).mean(0)

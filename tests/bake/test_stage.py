@@ -1,0 +1,221 @@
+"""The stage as a whole: its files, their contents, and what it says when it cannot."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from stages.bake import stage
+from stages.bake.options import BakeOptions
+from stages.bake.preview import bilinear
+from stages.bake.stage import bake
+from stages.bake.textures import srgb_8bit
+from stages.core.artifact import read_exr, read_manifest, sha256_file
+from stages.core.color import srgb_encode
+from stages.core.errors import ArtifactError, InputError, OutputError
+from stages.core.images import read_image
+from stages.core.schemas import ASSET
+from tests.bake.examples import (
+    constant_field,
+    cube,
+    grid,
+    ring_of_cameras,
+    save_material,
+    save_prep,
+    small_field,
+)
+from tests.bake.glb import Glb
+from tests.conftest import Golden
+
+SMALL = BakeOptions(size=512, supersample=1, preview_size=32)
+MATERIAL = (0.6, 0.3, 0.05, 0.35, 0.8)
+
+
+@pytest.fixture
+def no_preview(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For tests that look at other files: a blank preview."""
+    monkeypatch.setattr(stage, "contact_sheet", lambda *args: np.zeros((4, 4, 3), np.float32))
+
+
+TEXTURES = {"albedo.exr", "roughness.exr", "metallic.exr", "albedo.png", "orm.png"}
+
+
+@pytest.fixture(scope="module")
+def constant_asset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cube baked with one material; its source was an OBJ."""
+    folder = tmp_path_factory.mktemp("constant")
+    prep = save_prep(folder / "prep.npz", cube().with_(source_format="obj"))
+    material = save_material(folder / "material.npz", prep, constant_field(MATERIAL))
+    bake(prep, material, folder / "asset", SMALL)
+    return folder
+
+
+def test_all_files_are_there_and_the_manifest_knows_their_hashes(constant_asset: Path) -> None:
+    folder = constant_asset / "asset"
+    provenance, files = read_manifest(folder, ASSET)
+    obj = {"roughness.png", "metallic.png", "model.obj", "model.mtl"}
+    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png"}
+    assert all(sha256_file(folder / name) == digest for name, digest in files.items())
+    assert {path.name for path in folder.iterdir()} == {*files, "bake.json", "run.json"}
+    assert provenance.inputs["prep"] == sha256_file(constant_asset / "prep.npz")
+    assert (provenance.seed, provenance.extra["prompt"]) == (5, "a thing")
+    assert provenance.extra["unseen"] == pytest.approx(1 / 6, abs=1e-3)  # the bottom
+    assert provenance.extra["coverage"] == pytest.approx(0.96**2 * 2 / 3, abs=0.01)
+
+
+def test_one_material_is_that_material_in_every_texel_of_every_file(constant_asset: Path) -> None:
+    folder = constant_asset / "asset"
+    for name, channel, value in (
+        ("albedo.exr", "R", MATERIAL[0]), ("albedo.exr", "G", MATERIAL[1]), ("albedo.exr", "B", MATERIAL[2]),
+        ("roughness.exr", "Y", MATERIAL[3]), ("metallic.exr", "Y", MATERIAL[4]),
+    ):  # fmt: skip
+        pixels = read_exr(folder / name).channels[channel]
+        assert pixels.shape == (512, 512)
+        np.testing.assert_allclose(pixels.astype(float), value, atol=2.5e-4)  # half float
+    encoded = np.round(srgb_encode(np.array(MATERIAL[:3])) * 255) / 255
+    np.testing.assert_allclose(read_image(folder / "albedo.png"), np.broadcast_to(encoded, (512, 512, 3)), atol=1e-6)
+    packed = np.round(np.array([1, MATERIAL[3], MATERIAL[4]]) * 255) / 255
+    np.testing.assert_allclose(read_image(folder / "orm.png"), np.broadcast_to(packed, (512, 512, 3)), atol=1e-6)
+
+
+def test_the_model_holds_the_very_pictures(constant_asset: Path) -> None:
+    glb = Glb.read(constant_asset / "asset" / "model.glb")
+    for image in glb.root["images"]:
+        assert glb.view(image["bufferView"]) == (constant_asset / "asset" / f"{image['name']}.png").read_bytes()
+    textures = glb.root["materials"][0]["pbrMetallicRoughness"]
+    pictures = [glb.root["images"][glb.root["textures"][textures[key]["index"]]["source"]]["name"] for key in textures]
+    assert dict(zip(textures, pictures, strict=True)) == {
+        "baseColorTexture": "albedo",
+        "metallicRoughnessTexture": "orm",
+    }
+
+
+def test_the_same_request_is_up_to_date_and_force_gives_the_same_bytes(constant_asset: Path, tmp_path: Path) -> None:
+    prep, material, folder = (constant_asset / name for name in ("prep.npz", "material.npz", "asset"))
+    assert bake(prep, material, folder, SMALL).up_to_date
+    again = bake(prep, material, tmp_path / "again", SMALL, force=True)
+    assert not again.up_to_date
+    assert (tmp_path / "again" / "bake.json").read_bytes() == (folder / "bake.json").read_bytes()
+
+
+@pytest.mark.usefixtures("no_preview")
+def test_another_request_replaces_the_folder_and_takes_its_old_files_away(tmp_path: Path) -> None:
+    out = tmp_path / "asset"
+    for source_format in ("obj", "ply"):
+        prep = save_prep(tmp_path / "prep.npz", cube().with_(source_format=source_format))
+        material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+        bake(prep, material, out, SMALL)
+        (out / "mine.txt").write_text("not ours")
+    assert not (out / "model.obj").exists()
+    assert (out / "mine.txt").exists()
+
+
+@pytest.mark.usefixtures("no_preview")
+def test_a_failure_leaves_no_manifest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    out = tmp_path / "asset"
+    bake(prep, material, out, SMALL)
+
+    def no_space(*args: object) -> None:
+        raise OutputError(f"{out / 'model.glb'}: cannot be written: no space left on device")
+
+    monkeypatch.setattr(stage, "write_glb", no_space)
+    with pytest.raises(OutputError):
+        bake(prep, material, out, SMALL, force=True)
+    assert not (out / "bake.json").exists()
+    assert not list(out.glob(".*tmp*"))
+
+
+def test_the_material_of_another_mesh_is_refused(tmp_path: Path) -> None:
+    prep, other = save_prep(tmp_path / "prep.npz", cube()), save_prep(tmp_path / "other.npz", grid(2))
+    material = save_material(tmp_path / "material.npz", other, constant_field(MATERIAL))
+    with pytest.raises(ArtifactError, match=r"material\.npz: made from another prep") as caught:
+        bake(prep, material, tmp_path / "asset", SMALL)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "asset").exists()
+
+
+def test_swapped_missing_and_damaged_inputs_are_named(tmp_path: Path) -> None:
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    with pytest.raises(ArtifactError, match=r"material\.npz: a dreammat\.material artefact, expected dreammat\.prep"):
+        bake(material, prep, tmp_path / "asset", SMALL)
+    with pytest.raises(ArtifactError, match=r"nothing\.npz"):
+        bake(prep, tmp_path / "nothing.npz", tmp_path / "asset", SMALL)
+    material.write_bytes(material.read_bytes()[:2000])
+    with pytest.raises(ArtifactError, match=r"material\.npz"):
+        bake(prep, material, tmp_path / "asset", SMALL)
+
+
+def test_a_file_where_the_folder_should_be_is_named(tmp_path: Path) -> None:
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    (tmp_path / "asset").write_text("a file")
+    with pytest.raises(OutputError, match="asset: cannot be written"):
+        bake(prep, material, tmp_path / "asset", SMALL)
+    assert (tmp_path / "asset").read_text() == "a file"
+
+
+def test_uvs_that_cover_nothing_are_an_error(tmp_path: Path) -> None:
+    example = cube()
+    prep = save_prep(tmp_path / "prep.npz", example.with_(loop_uv=0 * example.loop_uv))
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    with pytest.raises(ArtifactError, match=r"prep\.npz: its UVs cover no texel"):
+        bake(prep, material, tmp_path / "asset", SMALL)
+
+
+@pytest.mark.parametrize("wrong", [{"size": 1000}, {"size": 256}, {"supersample": 0}, {"preview_size": 1}])
+def test_options_out_of_range_are_refused(wrong: dict[str, int]) -> None:
+    with pytest.raises(InputError, match="expected"):
+        BakeOptions(**wrong)
+
+
+@pytest.mark.usefixtures("no_preview")
+def test_unseen_surface_takes_the_colour_of_seen_surface(tmp_path: Path) -> None:
+    """Below the cube nobody looks: the field's own values there must not appear, those of its sides must."""
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, small_field())
+    bake(prep, material, tmp_path / "asset", SMALL)
+    hidden = read_exr(tmp_path / "asset" / "albedo.exr").channels["R"].astype(float)
+    every_side = np.concatenate([ring_of_cameras(4, 0.5), ring_of_cameras(4, -0.5), ring_of_cameras(1, 1.5)])
+    seen = save_material(tmp_path / "seen.npz", prep, small_field(), every_side)
+    bake(prep, seen, tmp_path / "seen", SMALL)
+    whole = read_exr(tmp_path / "seen" / "albedo.exr").channels["R"].astype(float)
+    report = json.loads((tmp_path / "seen" / "bake.json").read_text())["extra"]
+    assert report["unseen"] == 0
+    # the bottom, at y = -0.5 of a +y up source, is chart 2 of `cube`: the right of three columns, its lower row
+    chart = (slice(512 - 171 + 4, 512 - 4), slice(341 + 4, 512 - 4))
+    differs = np.abs(hidden - whole) > 1e-3
+    assert differs[chart].mean() > 0.9
+    differs[512 - 171 - 4 :, 341 - 4 :] = False  # the chart and its padding
+    assert not differs.any()
+    np.testing.assert_allclose(hidden[chart].mean(), whole.mean(), atol=0.1)  # that of its sides
+
+
+def test_srgb_bytes_are_the_rounded_curve() -> None:
+    linear = np.concatenate([np.linspace(0, 1, 100_003), [-1, 2]]).astype("f4")
+    exact = srgb_encode(linear.astype(float)) * 255
+    assert np.abs(srgb_8bit(linear) - exact).max() <= 0.5 + 1e-4
+
+
+def test_bilinear_look_up_at_centres_between_them_and_beyond() -> None:
+    maps = np.array([[[0.0], [1.0]], [[2.0], [3.0]]], "f4")  # v is up: the first row is at v = 0.75
+    uv = np.array([[0.25, 0.75], [0.75, 0.25], [0.5, 0.5], [-1, 2], [0.5, 0.75]], "f4")
+    np.testing.assert_allclose(bilinear(maps, uv)[:, 0], [0, 3, 1.5, 0, 0.5], atol=1e-6)
+
+
+def test_golden_bake(tmp_path: Path, golden: Golden) -> None:
+    """A cube with a varied material, seen from above; every eighth texel, and the preview."""
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, small_field())
+    result = bake(prep, material, tmp_path / "asset", BakeOptions(size=512, supersample=2, preview_size=32))
+    folder = result.folder
+    channels = {name: read_exr(folder / f"{name}.exr").channels for name in ("albedo", "roughness", "metallic")}
+    arrays = {f"{name}_{c}": pixels[::8, ::8] for name, pixel in channels.items() for c, pixels in pixel.items()}
+    arrays["shares"] = np.array([result.report["coverage"], result.report["unseen"]])
+    golden.check("bake/cube_maps", arrays, atol=6e-4)  # one step of a half float near 1 where the last float differs
+    pictures = {"albedo": read_image(folder / "albedo.png")[::8, ::8]}
+    pictures["preview"] = read_image(folder / "preview.png")[:64]  # the shaded views; below them there is text
+    golden.check("bake/cube_pictures", pictures, atol=1.5 / 255)  # one 8-bit step

@@ -1,0 +1,165 @@
+"""The fast transport against the float64 reference, the white furnace, and lights and views that are hard."""
+
+import numpy as np
+import pytest
+import torch
+
+from stages.core.brdf import alpha_from_roughness, directional_albedo
+from stages.core.color import reinhard
+from stages.core.shading import F0, KNOTS, Transport
+from stages.light.environment import Environment, directions_of_texels
+from stages.light.gbuffer import GBuffer
+from stages.light.reference import reference_transport
+from stages.light.scene import Scene
+from stages.light.transport import QUALITY, Quality, light_transport
+from tests.light import scenes
+
+
+def stacked(transport: Transport) -> torch.Tensor:
+    """E, A and B side by side: (P, 1 + 2 K, 3)."""
+    return torch.cat([transport.E[:, None], transport.A, transport.B], 1).double()
+
+
+def rmse_percent(scene: Scene, points: GBuffer, light: Environment, quality: Quality, subdivision: int) -> float:
+    """Tone-mapped RMSE of all terms over up to 48 pixels, in percent."""
+    pixels = np.random.default_rng(0).permutation(len(points.n))[:48]
+    reference = stacked(reference_transport(scene, points, light, subdivision, pixels))
+    fast = stacked(light_transport(scene, points, [light], quality, 0)[0][torch.from_numpy(pixels)])
+    return float((reinhard(fast) - reinhard(reference)).square().mean().sqrt() * 100)
+
+
+@pytest.fixture(scope="module", params=["sphere", "corner"])
+def scene(request: pytest.FixtureRequest) -> Scene:
+    return scenes.sphere(4) if request.param == "sphere" else scenes.box_in_corner()
+
+
+def test_agrees_with_the_reference_under_a_sun(scene: Scene) -> None:
+    points = scenes.view_of(scene, 24)
+    assert rmse_percent(scene, points, scenes.sunny_light(), QUALITY["standard"], 6) < 1.0
+
+
+def test_error_falls_with_rays() -> None:
+    scene = scenes.box_in_corner()
+    points = scenes.view_of(scene, 20)
+    light = scenes.sunny_light()
+    few, many = (rmse_percent(scene, points, light, Quality(n, n // 6), 6) for n in (24, 1536))
+    assert many < 0.35 * few
+
+
+def test_skull_under_a_sun(assets) -> None:  # type: ignore[no-untyped-def]
+    import trimesh
+
+    mesh = trimesh.load(assets / "meshes" / "skull.obj", process=False)
+    vertices = mesh.vertices - mesh.bounds.mean(0)
+    vertices = (vertices / np.ptp(vertices, axis=0).max())[:, [2, 0, 1]]
+    scene = Scene(vertices, mesh.faces, mesh.vertex_normals[:, [2, 0, 1]][mesh.faces])
+    points = scenes.view_of(scene, 32)
+    assert rmse_percent(scene, points, scenes.sunny_light(), QUALITY["standard"], 6) < 1.0
+
+
+@pytest.mark.parametrize("cosine", (0.05, 0.1, 0.3, 0.7, 1.0))
+def test_white_furnace_at_knots(cosine: float) -> None:
+    scene = scenes.sphere(1, 0.01)
+    transport = light_transport(scene, scenes.open_point(cosine, 4), [scenes.even_light()], QUALITY["draft"], 1)[0]
+    for k, roughness in enumerate(KNOTS):
+        if roughness == 0:
+            exact = 1.0
+        else:
+            exact = directional_albedo(np.array([cosine]), alpha_from_roughness(roughness), 700)[0, 1:].sum()
+        assert (transport.A[:, k] + transport.B[:, k]).numpy() == pytest.approx(exact, abs=2e-3)
+
+
+@pytest.mark.parametrize("cosine", (0.05, 0.3, 0.7, 1.0))
+def test_dielectric_furnace(cosine: float) -> None:
+    """E, and E + F0 A + B as a whole, equal their quadrature; each lobe by itself reflects no more than it receives.
+
+    The sum itself passes 1 towards grazing (1.03 at N·V = 0.5, 1.7 at 0.05 for a mirror): glTF mixes its two lobes by
+    the Fresnel weight at V·H, which is small for most of the diffuse lobe when it is large for the specular one.
+    """
+    points = scenes.open_point(cosine)
+    t = light_transport(scenes.sphere(1, 0.01), points, [scenes.even_light()], QUALITY["standard"], 0)[0]
+    for k, roughness in enumerate(KNOTS[1:], 1):
+        E, A, B = directional_albedo(np.array([cosine]), alpha_from_roughness(roughness), 500)[0]
+        assert float(t.E[0, 0] + F0 * t.A[0, k, 0] + t.B[0, k, 0]) == pytest.approx(E + F0 * A + B, abs=2e-3)
+    assert float(t.E.max()) <= 1
+    assert float((t.A + t.B).max()) <= 1 + 1e-6
+
+
+def test_same_seed_same_bits_whatever_the_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scenes.box_in_corner()
+    points = scenes.view_of(scene, 96)
+    results = []
+    for threads in (1, 3):
+        monkeypatch.setattr("os.cpu_count", lambda threads=threads: threads)
+        results.append(stacked(light_transport(scene, points, [scenes.sunny_light()], QUALITY["draft"], 7)[0]))
+    assert torch.equal(*results)
+
+
+def test_environments_do_not_influence_each_other_in_the_mean() -> None:
+    scene = scenes.sphere(3)
+    points = scenes.view_of(scene, 24)
+    lights = [scenes.sunny_light(), scenes.even_light()]
+    together = [reinhard(stacked(t)).mean() for t in light_transport(scene, points, lights, QUALITY["high"], 0)]
+    apart = [light_transport(scene, points, [light], QUALITY["high"], 1)[0] for light in lights]
+    alone = [reinhard(stacked(t)).mean() for t in apart]
+    assert [float(t) for t in together] == pytest.approx([float(a) for a in alone], rel=5e-3)
+
+
+def test_single_texel_light_does_not_sparkle() -> None:
+    """All light in one texel: the rough terms keep within twice the reference's largest value."""
+    scene, light = scenes.sphere(4), scenes.single_texel_light()
+    points = scenes.view_of(scene, 32)
+    t = light_transport(scene, points, [light], QUALITY["standard"], 0)[0]
+    pixels = np.arange(0, len(points.n), 9)
+    reference = reference_transport(scene, points, light, 8, pixels)
+    for fast, exact in ((t.E, reference.E), (t.A[:, -1], reference.A[:, -1]), (t.A[:, 5], reference.A[:, 5])):
+        assert float(fast.max()) < 2 * float(exact.max())
+    assert rmse_percent(scene, points, light, QUALITY["standard"], 8) < 1.0
+
+
+@pytest.mark.parametrize("roughness", range(len(KNOTS)))
+def test_finite_at_grazing_view(roughness: int) -> None:
+    t = light_transport(
+        scenes.sphere(1, 0.01), scenes.open_point(1e-3, 8), [scenes.sunny_light(65000.0)], QUALITY["draft"], 0
+    )[0]
+    assert bool(t.A[:, roughness].isfinite().all())
+    assert bool(t.B[:, roughness].isfinite().all())
+
+
+def test_view_without_the_object() -> None:
+    scene = scenes.sphere(2)
+    points = scenes.view_of(scene, 16, eye=(400.0, 300.0, 200.0))
+    empty = GBuffer(points.mask & False, points.depth * 0, *(getattr(points, f)[:0] for f in POINT_FIELDS))
+    assert len(light_transport(scene, empty, [scenes.even_light()], QUALITY["draft"], 0)[0].E) == 0
+
+
+POINT_FIELDS = ("point", "origin", "n", "ng", "wo", "triangle", "barycentric")
+
+
+def test_coarse_smooth_sphere_has_no_black_facets() -> None:
+    """Twenty triangles with smooth normals: where the shading normal faces the sun, light arrives."""
+    scene, light = scenes.sphere(0), scenes.single_texel_light()
+    points = scenes.view_of(scene, 48)
+    rows, columns = np.nonzero(light.radiance[..., 0])
+    direction = directions_of_texels(*light.radiance.shape[:2])[0][rows[0], columns[0]]
+    lit = points.n @ direction > 0.25
+    t = light_transport(scene, points, [light], QUALITY["standard"], 0)[0]
+    assert float((t.E[torch.from_numpy(lit)].amax(1) <= 0).float().mean()) < 0.01
+
+
+def test_duplicate_faces_do_not_shadow_themselves() -> None:
+    base = scenes.sphere(3)
+    scene = Scene(base.vertices, np.concatenate([base.triangles] * 2), np.concatenate([base.normals] * 2))
+    points = scenes.view_of(scene, 24)
+    once, twice = (light_transport(s, points, [scenes.even_light()], QUALITY["draft"], 0)[0].E for s in (base, scene))
+    assert torch.equal(once, twice)
+
+
+def test_closed_box_lets_no_light_in() -> None:
+    import trimesh
+
+    mesh = trimesh.creation.box()
+    scene = Scene(mesh.vertices, mesh.faces, scenes.flat_normals(mesh.vertices, mesh.faces))
+    points = scenes.view_of(scene, 32, eye=(0.3, 0.2, 0.1))
+    t = light_transport(scene, points, [scenes.even_light()], QUALITY["draft"], 0)[0]
+    assert float(stacked(t).max()) == 0.0

@@ -1,0 +1,153 @@
+"""New UVs, by either way of making charts: no overlap, full gutters, whole polygons, one scale."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from stages.prep import charts, unwrap, xatlas_worker
+from stages.prep.overlap import overlapping
+from stages.prep.pack import pack
+from stages.prep.stitch import stitch
+from stages.prep.uv import coverage, overlap, signed_area, uv_charts
+from tests.prep.shapes import cube, sphere
+
+SIZE, PADDING = 512, 4
+
+
+def spiral(turns: int = 3, steps: int = 40) -> tuple[NDArray, NDArray]:
+    """A ramp that winds over itself: seen from above it overlaps, though every face looks up."""
+    angle = np.arange(turns * steps + 1) / steps * 2 * np.pi
+    height = angle / (2 * np.pi) * 0.2
+    inner, outer = (np.stack([r * np.cos(angle), r * np.sin(angle), height], -1) for r in (0.2, 0.5))
+    i = np.arange(len(angle) - 1)
+    o = i + len(angle)
+    return np.concatenate([inner, outer]), np.concatenate(
+        [np.stack([i, o, o + 1], -1), np.stack([i, o + 1, i + 1], -1)]
+    )
+
+
+def boxes(count: int) -> tuple[NDArray, NDArray]:
+    """Loose cubes in a row."""
+    vertices, triangles = cube()
+    moved = [vertices * 0.05 + [0.1 * k - 0.5, 0, 0] for k in range(count)]
+    return np.concatenate(moved), np.concatenate([triangles + 8 * k for k in range(count)])
+
+
+SHAPES = {"cube": cube(), "sphere": sphere(), "spiral": spiral(), "boxes": boxes(10)}
+
+
+def polygons_of(name: str, triangles: NDArray) -> NDArray:
+    """Quads where the shape is made of them, else one polygon a triangle."""
+    return np.arange(len(triangles)) // 2 if name in ("cube", "boxes") else np.arange(len(triangles))
+
+
+@pytest.mark.parametrize("seconds", [0.0, 30.0], ids=["projection", "xatlas"])
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_layout_can_be_baked(name: str, seconds: float) -> None:
+    vertices, triangles = SHAPES[name]
+    polygon = polygons_of(name, triangles)
+    layout = unwrap.unwrap(vertices, triangles, polygon, SIZE, PADDING, seconds)
+    assert layout.uv.min() >= 0 and layout.uv.max() <= 1
+    assert overlap(layout.uv) < 1e-3
+    assert (signed_area(layout.uv) > 0).all()
+    chart = uv_charts(triangles, layout.uv)
+    assert all(len(set(chart[polygon == p])) == 1 for p in np.unique(polygon))
+    assert layout.packing.gutter == 2 * PADDING
+    assert gap(layout.uv, layout.chart, SIZE) >= 2 * PADDING
+
+
+def gap(uv: NDArray, chart: NDArray, size: int) -> float:
+    """Least distance between the first few charts, in texels, by drawing them at twice the size."""
+    fine, least = 2 * size, np.inf
+    drawn = [coverage(uv[chart == c].astype(float) * fine, fine, fine) > 0 for c in np.unique(chart)[:4]]
+    for index, one in enumerate(drawn):
+        distance = distance_transform_edt(~one)
+        least = min([least, *(distance[other].min() for other in drawn[index + 1 :])])
+    return (least + 1) / 2  # a fine texel is covered from its centre
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_texels_are_spread_evenly(name: str) -> None:
+    """Projection may squash a face to its cosine to the chart, never more, and never stretches it."""
+    vertices, triangles = SHAPES[name]
+    layout = unwrap.unwrap(vertices, triangles, np.arange(len(triangles)), SIZE, PADDING, 0.0)
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    density = signed_area(layout.uv) * SIZE**2 / area / layout.packing.texels_per_unit**2
+    assert density.max() < 1.03 and density.min() > 0.3
+
+
+def test_the_time_limit_stops_xatlas(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A worker that never ends is killed, and the fallback delivers."""
+    slow = tmp_path / "slow.py"
+    slow.write_text("import time\ntime.sleep(60)\n")
+    monkeypatch.setattr(xatlas_worker, "__file__", str(slow))
+    vertices, triangles = cube()
+    start = time.monotonic()
+    layout = unwrap.unwrap(vertices, triangles, np.arange(12), SIZE, PADDING, 0.5)
+    assert time.monotonic() - start < 20
+    assert layout.method == "projection: xatlas took more than 0.5 s" and overlap(layout.uv) == 0
+
+
+def test_a_crash_of_xatlas_is_survived(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    crash = tmp_path / "crash.py"
+    crash.write_text("import os\nos.abort()\n")
+    monkeypatch.setattr(xatlas_worker, "__file__", str(crash))
+    vertices, triangles = cube()
+    assert unwrap.unwrap(vertices, triangles, np.arange(12), SIZE, PADDING, 5.0).method == "projection: xatlas failed"
+
+
+def test_the_worker_stands_alone(tmp_path: Path) -> None:
+    """It runs by its path, in any folder, and its charts are brought to their true size."""
+    vertices, triangles = cube()
+    np.savez(tmp_path / "in.npz", vertices=vertices.astype("f4"), triangles=triangles.astype("u4"))
+    command = [sys.executable, xatlas_worker.__file__, "in.npz", "out.npz"]
+    subprocess.run(command, check=True, cwd=tmp_path, env={})
+    with np.load(tmp_path / "out.npz") as made:
+        scaled = unwrap._to_scale(vertices[triangles], made["uv"].astype(float), made["chart"])
+    assert np.abs(np.abs(signed_area(made["uv"])) - 0.5).max() < 0.02  # xatlas rounds to its texels
+    np.testing.assert_allclose(np.abs(signed_area(scaled)), 0.5, rtol=1e-5)
+
+
+def test_a_box_unfolds_into_nets() -> None:
+    """Six faces apart waste gutters; hinged they are fewer charts, flat and to scale."""
+    vertices, triangles = cube()
+    chart = np.repeat(np.arange(6), 2).astype(np.int32)
+    flat = charts.project(vertices, triangles, chart)
+    joined, label = stitch(flat, triangles, chart, SIZE, 16)
+    assert len(set(label)) <= 3 and np.array_equal(uv_charts(triangles, joined), label)
+    np.testing.assert_allclose(signed_area(joined), 0.5, rtol=1e-6)
+    assert not overlapping(joined, label).any()
+
+
+def test_charts_that_cover_themselves_are_found() -> None:
+    vertices, triangles = spiral()
+    flat = vertices[triangles][..., :2]
+    assert overlapping(flat, np.zeros(len(triangles), np.int32)).tolist() == [True]
+    once = triangles[vertices[triangles][..., 2].max(1) < 0.19]
+    assert overlapping(vertices[once][..., :2], np.zeros(len(once), np.int32)).tolist() == [False]
+
+
+@pytest.mark.parametrize("count, gutter", [(40, 8), (3500, 8), (9000, 4)])
+def test_packing_many_charts_ends_and_fits(count: int, gutter: int) -> None:
+    """Triangles of many sizes, more than the horizon takes too, halve the padding only when they must."""
+    rng = np.random.default_rng(0)
+    flat = rng.random((count, 3, 2)) * rng.uniform(0.01, 0.2, (count, 1, 1))
+    packing = pack(flat, np.arange(3 * count).reshape(-1, 3), np.arange(count, dtype=np.int32), SIZE, PADDING)
+    assert overlap(packing.uv) < 1e-3
+    assert packing.gutter == gutter
+    scaled = np.abs(signed_area(flat)) * (packing.texels_per_unit / SIZE) ** 2
+    np.testing.assert_allclose(np.abs(signed_area(packing.uv)), scaled, rtol=0.02, atol=1e-9)
+
+
+def test_growing_charts_keeps_flat_sides_whole() -> None:
+    vertices, triangles = cube()
+    chart = charts.grow(vertices, triangles, np.arange(12))
+    assert len(set(chart)) <= 6 and (chart[::2] == chart[1::2]).all()
+    assert not charts.steep(vertices, triangles, chart).any()

@@ -1,0 +1,83 @@
+import numpy as np
+import pytest
+import torch
+
+from stages.prior.model import VOCABULARY_FILE
+from stages.prior.text import MAX_WORDS, TextEmbedding, TextEncoder, Vocabulary, split_words
+
+
+@pytest.fixture(scope="module")
+def vocabulary() -> Vocabulary:
+    return Vocabulary.load(VOCABULARY_FILE)
+
+
+def closeness(vocabulary: Vocabulary, a: str, b: str) -> float:
+    u, v = vocabulary.vector(a), vocabulary.vector(b)
+    return float(u @ v / (np.linalg.norm(u) * np.linalg.norm(v)))
+
+
+@pytest.mark.parametrize(
+    ("word", "near", "far"),
+    [
+        ("mahogany", "oak", "silver"),
+        ("gilded", "gold", "wool"),
+        ("crimson", "red", "gravel"),
+        ("denim", "fabric", "granite"),
+        ("corroded", "rusty", "velvet"),
+        ("porcelain", "ceramic", "leather"),
+        ("basalt", "granite", "silk"),
+        ("tweed", "wool", "chrome"),
+    ],
+)
+def test_words_lie_nearer_to_their_kin(vocabulary: Vocabulary, word: str, near: str, far: str) -> None:
+    assert closeness(vocabulary, word, near) > closeness(vocabulary, word, far) + 0.1
+
+
+@pytest.mark.parametrize(
+    ("unknown", "known"),
+    [("mahoganies", "mahogany"), ("porcelainlike", "porcelain"), ("graniteish", "granite"), ("porcelane", "porcelain")],
+)
+def test_an_unknown_word_takes_the_place_of_the_nearest_spelling(
+    vocabulary: Vocabulary, unknown: str, known: str
+) -> None:
+    assert unknown not in vocabulary.index
+    assert closeness(vocabulary, unknown, known) > 0.5
+
+
+def test_a_word_that_resembles_nothing_is_silent(vocabulary: Vocabulary) -> None:
+    assert not vocabulary.vector("qxzvkj").any()
+
+
+def test_word_vectors_are_unit_and_words_are_sorted(vocabulary: Vocabulary) -> None:
+    length = np.linalg.norm(vocabulary.vectors, axis=1)
+    assert np.abs(length - 1).max() < 0.03  # 8-bit rounding
+    assert list(vocabulary.index) == sorted(vocabulary.index)
+
+
+def test_prompts_are_split_without_articles_accents_and_case() -> None:
+    assert split_words("A Rosé-Gold statue, of the 1st CLASS!") == ["rose", "gold", "statue", "st", "class"]
+    assert split_words("") == []
+
+
+def test_long_prompts_are_cut(vocabulary: Vocabulary) -> None:
+    vectors, present = vocabulary.encode(["gold " * 50, ""])
+    assert vectors.shape == (2, MAX_WORDS, 64)
+    assert present[0].all() and not present[1].any()
+
+
+def test_encoder_ignores_what_follows_the_prompt(vocabulary: Vocabulary) -> None:
+    torch.manual_seed(0)
+    encoder = TextEncoder().eval()
+    vectors, present = vocabulary.encode(["red plastic", ""])
+    noisy = vectors + 5 * (~present)[..., None]
+    with torch.no_grad():
+        clean, other = encoder(vectors, present), encoder(noisy, present)
+    assert torch.allclose(clean.pooled, other.pooled, atol=1e-6)
+    assert torch.isfinite(clean.tokens).all()
+
+
+def test_embeddings_expand_and_join() -> None:
+    one = TextEmbedding(torch.randn(1, 5, 8), torch.ones(1, 5, dtype=torch.bool), torch.randn(1, 8))
+    joined = TextEmbedding.cat([one.expand(2), one])
+    assert joined.tokens.shape == (3, 5, 8) and joined.pooled.shape == (3, 8)
+    assert torch.equal(joined.tokens[0], joined.tokens[2])

@@ -1,0 +1,117 @@
+"""A miniature training run: tiny, but every part of the real one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from stages.core.artifact import load_npz, sha256_file
+from stages.core.errors import NumericalError
+from stages.prior.model import VOCABULARY_FILE, PriorNetwork, load_prior
+from stages.prior.text import Vocabulary
+from stages.train import prior, samples
+from stages.train.batches import CaptionBatches, PictureBatches, Tiles
+from stages.train.options import TrainPriorOptions
+from stages.train.render import render_shards
+
+OPTIONS = TrainPriorOptions(
+    steps=6, text_steps=2, batch=2, shards=1, tiles=3, seed=3, checkpoint_every=3, sample_every=100
+)
+
+
+@pytest.fixture(scope="module")
+def shards(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    return render_shards(tmp_path_factory.mktemp("tiles") / "shards", 1, 3, 3, lambda *_: None)
+
+
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch, shards: list[Path]) -> None:
+    monkeypatch.setattr(prior, "render_shards", lambda *_: shards)
+    monkeypatch.setattr(prior, "CAPTIONS", 4)
+    monkeypatch.setattr(prior, "write_samples", lambda *_: None)
+
+
+def test_batches_depend_on_seed_and_step_alone(shards: list[Path]) -> None:
+    tiles = Tiles(shards)
+    one, again, other = (PictureBatches(tiles, 2, 0)[step] for step in (5, 5, 6))
+    assert torch.equal(one.image, again.image) and one.captions == again.captions
+    assert not torch.equal(one.image, other.image)
+    assert one.image.shape == (2, 3, 64, 64) and one.conditions.shape == (2, 22, 64, 64)
+    outside = one.mask.expand_as(one.image) == 0
+    assert one.image[outside].eq(-1).all() and torch.isfinite(one.image).all()
+    assert one.material.min() >= 0 and one.material.max() <= 1
+
+
+def test_captions_and_means_agree_in_number() -> None:
+    captions, means = CaptionBatches(5, 0)[0]
+    assert len(captions) == len(means) == 5 and means.shape == (5, 5)
+
+
+def test_training_resumes_to_the_same_bytes(tmp_path: Path, quick: None) -> None:
+    whole = prior.train_prior(tmp_path / "whole", OPTIONS)
+    stopped = tmp_path / "stopped"
+
+    def stop_after_four(what: str, done: int, total: int) -> None:
+        if done == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        prior.train_prior(stopped, OPTIONS, progress=stop_after_four)
+    resumed = prior.train_prior(stopped, OPTIONS)
+    assert whole.step == resumed.step == OPTIONS.steps
+    first, second = (load_npz(folder / "checkpoint.npz", prior.CHECKPOINT) for folder in (tmp_path / "whole", stopped))
+    for name in ("parameters", "average", "moment_1", "moment_2"):
+        assert np.array_equal(first[name], second[name]), name
+    assert np.array_equal(first["curve"][:, :4], second["curve"][:, :4])
+
+
+def test_a_finished_run_is_up_to_date_and_its_weights_load(tmp_path: Path, quick: None) -> None:
+    done = prior.train_prior(tmp_path, OPTIONS)
+    before = sha256_file(done.weights)
+    assert prior.train_prior(tmp_path, OPTIONS).up_to_date
+    assert sha256_file(done.weights) == before
+    loaded = load_prior("cpu", done.weights)
+    assert loaded.identity["training"]["step"] == OPTIONS.steps
+    assert (tmp_path / "curve.csv").read_text().count("\n") == OPTIONS.steps + 1
+
+
+def test_losses_fall_on_one_batch(shards: list[Path]) -> None:
+    torch.manual_seed(0)
+    vocabulary = Vocabulary.load(VOCABULARY_FILE)
+    state = prior.State(PriorNetwork(64), torch.device("cpu"))
+    batch = PictureBatches(Tiles(shards), 2, 0)[0]
+    alpha_bar = prior.diffusion.cosine_schedule()
+    losses = []
+    for _ in range(12):
+        generator = torch.Generator().manual_seed(1)
+        noise, material, text = prior.picture_losses(state.network, vocabulary, batch, alpha_bar, generator)
+        (noise + material + text).backward()
+        state.update(2e-3)
+        losses.append([float(noise.detach()), float(material.detach()), float(text.detach())])
+    assert (np.array(losses[-1]) < 0.8 * np.array(losses[0])).all(), losses
+
+
+def test_a_gradient_that_is_not_finite_stops_the_run() -> None:
+    state = prior.State(PriorNetwork(64), torch.device("cpu"))
+    state.gradient[0] = torch.inf
+    with pytest.raises(NumericalError, match="step 0"):
+        state.update(1e-3)
+
+
+def test_the_rate_warms_up_in_both_phases_and_falls() -> None:
+    options = TrainPriorOptions(steps=4000, text_steps=500)
+    rate = np.array([prior.learning_rate(step, options) for step in range(4000)])
+    assert rate[0] < 0.01 * rate[400] and rate[500] < 0.01 * rate[400]
+    assert rate.max() == options.learning_rate and rate[-1] < 0.06 * rate.max() and rate.min() > 0
+
+
+def test_sample_sheets_are_pictures(tmp_path: Path, quick: None, shards: list[Path], monkeypatch) -> None:
+    done = prior.train_prior(tmp_path, OPTIONS)
+    monkeypatch.setattr(samples, "PROMPTS", ("gold", "oak"))
+    monkeypatch.setattr(samples, "ROWS", 1)
+    samples.write_samples(tmp_path / "sheet.png", done.weights, Tiles(shards), OPTIONS)
+    from stages.core.images import read_image
+
+    sheet = read_image(tmp_path / "sheet.png")
+    assert sheet.shape == (64, 3 * 64, 3) and sheet.std() > 0.01
