@@ -39,9 +39,10 @@ def weight(name: str, text: str) -> Any:
 @click.option("--device", default=DEFAULT["device"], show_default=True, help="A torch device: cpu, cuda, mps.")
 @weight("smoothness", "Weight of the difference between neighbouring points' materials.")
 @weight("eta1", "Weight of the positive prediction (paper, Eq. 7).")
-@weight("eta2_start", "Weight of the negative prediction at the first step.")
-@weight("eta2_end", "And from two thirds of the steps on.")
+@click.option("--eta2", type=(UNIT, UNIT), default=DEFAULT["eta2"], show_default=True, metavar="START END",
+              help="Of the negative one, at the first step and from two thirds of the steps on.")
 @weight("posterior", "Share of the posterior-mean term; 0 is the paper's pure classifier score.")
+@weight("anchor", "Weight of the distance between the mean material and what the words alone call for.")
 @weight("bimodal", "How strongly metallic is sent to 0 or 1 towards the end.")
 @common_options
 def command(conditions: Path, output: Path, common: Common, **chosen: Any) -> None:

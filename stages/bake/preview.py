@@ -153,7 +153,7 @@ def labelled(cell: NDArray[np.float32], text: str) -> NDArray[np.float32]:
     """A picture with its name in a corner; without, where OpenImageIO finds no font."""
     picture = oiio.ImageBuf(np.ascontiguousarray(cell, np.float32))
     left, base = TEXT_HEIGHT // 2, 3 * TEXT_HEIGHT // 2
-    oiio.ImageBufAlgo.render_text(picture, left, base, text, TEXT_HEIGHT, "", (0.9, 0.9, 0.9))
+    oiio.ImageBufAlgo.render_text(picture, left, base, text, TEXT_HEIGHT, "", (0.95, 0.95, 0.95), shadow=2)
     return np.asarray(picture.get_pixels(oiio.FLOAT), np.float32).reshape(cell.shape)
 
 

@@ -143,7 +143,7 @@ def start_folder(out: Path, request: Provenance, force: bool) -> None:
 def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: ConditionsOptions) -> None:
     """Write cameras.npz."""
     size = np.array(options.size, np.int32)
-    arrays = {"c2w": cameras.c2w, "fov_y": cameras.fov_y, "width": size, "height": size}
+    arrays: dict[str, NDArray] = {"c2w": cameras.c2w, "fov_y": cameras.fov_y, "width": size, "height": size}
     save_npz(out / "cameras.npz", CAMERAS, arrays, request)
 
 

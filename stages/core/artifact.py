@@ -131,7 +131,8 @@ def written_atomically(path: Path) -> Iterator[Path]:
         hint = "; free some space and run the same command again" if error.errno == errno.ENOSPC else ""
         raise OutputError(f"{path}: cannot be written: {reason(error)}{hint}") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # gone when all went well; its folder may never have existed
+            temporary.unlink()
 
 
 def write_text(path: Path, text: str) -> None:

@@ -28,6 +28,9 @@ FEATURES = 2
 OUTPUTS = 5
 """Red, green and blue of the albedo, roughness, metallic."""
 
+START_MARGIN = 0.03
+"""A start is kept this far from 0 and 1, where the sigmoid has no slope left."""
+
 START = (0.27, 0.27, 0.27, 0.55, 0.12)
 """The material before the first step: a dark dielectric, from which metals and dielectrics both are reached."""
 
@@ -91,6 +94,11 @@ class MaterialField(nn.Module):
         self.bias_0 = nn.Parameter(torch.zeros(config.hidden))
         self.weights_1 = nn.Parameter(_uniform((OUTPUTS, config.hidden), math.sqrt(3 / config.hidden), generator))
         self.bias_1 = nn.Parameter(torch.logit(torch.tensor(START)))
+
+    def begin_at(self, material: Tensor) -> None:
+        """Make the untrained field this material everywhere. Args: (5,) linear albedo, roughness, metallic."""
+        with torch.no_grad():
+            self.bias_1.copy_(torch.logit(material.to(self.bias_1), eps=START_MARGIN))
 
     def forward(self, p: Tensor) -> Material:
         """Material of points p (N, 3), world."""

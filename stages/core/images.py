@@ -24,6 +24,7 @@ def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
     height, width, count = pixels.shape
     with written_atomically(path) as temporary:
         output = oiio.ImageOutput.create(str(temporary))
+        assert output is not None, "OpenImageIO was built without PNG"
         spec = oiio.ImageSpec(width, height, count, "uint8")
         spec["png:compressionLevel"] = compression
         written = output.open(str(temporary), spec)

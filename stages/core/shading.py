@@ -5,8 +5,8 @@ With transport E, A(r), B(r) of one pixel and one environment (see `stages.light
     radiance = (1 - m) c E + (F0 (1 - m) + m c) A(r) + B(r),   F0 = 0.04
 
 A and B are stored at the roughness `KNOTS`. Between them, what is interpolated is A and B relative to the albedo of an
-open point (`core.albedo`), by a monotone cubic: exact in a white furnace, and a third of the error of straight lines under
-real lights.
+open point (`core.albedo`), by a monotone cubic: exact in a white furnace, and a third of the error of straight lines
+under real lights.
 """
 
 from dataclasses import dataclass

@@ -21,7 +21,7 @@ class DistillOptions:
     prompt: str = ""  # what the object is made of
     negative_prompt: str = NEGATIVE_PROMPT  # what the picture should not look like
     eta1: float = 1.05  # weight of the positive prediction, Eq. 7
-    eta2_start: float = 1.0  # weight of the negative prediction at the first step
-    eta2_end: float = 0.5  # and from two thirds of the steps on
+    eta2: tuple[float, float] = (1.0, 0.5)  # of the negative one, at the first step and from two thirds of the steps on
     posterior: float = 0.0  # share of (eps_pos - noise) added to the classifier score; 0 is the paper's
+    anchor: float = 0.0  # weight of the distance between the mean material and what the words alone call for
     bimodal: float = 0.0  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end

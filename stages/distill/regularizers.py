@@ -22,6 +22,23 @@ def smoothness(material: Material, nearby: Material) -> Tensor:
     return (albedo + rest).mean()
 
 
+def metalness(metallic: Tensor) -> Tensor:
+    """m, mean over points: what is not called for as a metal is none. Differentiable in: metallic."""
+    return metallic.mean()
+
+
 def bimodality(metallic: Tensor) -> Tensor:
     """m (1 - m), mean over points: zero where a point is metal or not, never both. Differentiable in: metallic."""
     return (metallic * (1 - metallic)).mean()
+
+
+def distance_of_means(material: Material, expected: Tensor) -> Tensor:
+    """Squared distance between the points' mean material and an expected one. Differentiable in: material.
+
+    The mean alone is held, so that a composition may still differ from place to place.
+
+    Args:
+        expected: (5,) linear albedo, roughness, metallic.
+    """
+    mean = torch.cat([material.albedo.mean(0), material.roughness.mean()[None], material.metallic.mean()[None]])
+    return (mean - expected.to(mean)).square().sum()

@@ -59,7 +59,7 @@ def distill(
         checkpoint.checkpoint_path(out).unlink(missing_ok=True)
         return DistillResult(options.steps, 0, math.nan, True)
     with run_log(out) as log:
-        state = new_state(options, views, device)
+        state = new_state(options, views, device, guidance.start)
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
         _run(out, state, guidance, views, options, request, clock, progress)
@@ -92,10 +92,12 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
     raise InputError(f"--guidance {options.guidance}: unknown; expected prior or reference")
 
 
-def new_state(options: DistillOptions, views: Views, device: torch.device) -> State:
+def new_state(options: DistillOptions, views: Views, device: torch.device, start: Tensor | None) -> State:
     """Field and optimiser before the first step; the finest cells are as far apart as the surface points that all views see."""
     spacing = views.pixel_size() / math.sqrt(max(1.0, len(views.seen) / SEEN_BY))
     field = MaterialField(FieldConfig.for_detail(spacing), torch.Generator().manual_seed(options.seed)).to(device)
+    if start is not None:
+        field.begin_at(start)
     return State(field, RowAdam(dict(field.named_parameters()), tables=frozenset({"table"})))
 
 
@@ -139,7 +141,7 @@ def optimisation_step(
         sample = guidance.sampler.draw(generator)
         guidance.sampler.prefetch(step_generator(options.seed, state.step + 1))
     with clock("field"):
-        material, regularizer = _material(state.field, sample, options, share, generator)
+        material, nearby = _materials(state.field, sample, options, generator)
     with clock("shading"):
         radiance = shade(sample.transport, material)
     with clock("guidance"):
@@ -147,26 +149,34 @@ def optimisation_step(
     if not (math.isfinite(loss) and bool(torch.isfinite(gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, views, options.seed))
     with clock("backward"):
-        losses = [radiance] if regularizer is None else [radiance, regularizer]
-        torch.autograd.backward(losses, [gradient, None][: len(losses)])
+        regularizer = _regularizer(material, nearby, options, guidance, share)
+        torch.autograd.backward([radiance, regularizer], [gradient, None])
     with clock("optimiser"):
         state.optimizer.step(options.learning_rate * schedule.learning_rate(share))
     return loss
 
 
-def _material(
-    field: MaterialField, sample: Sample, options: DistillOptions, share: float, generator: torch.Generator
-) -> tuple[Material, Tensor | None]:
-    """The material of a sample's points, and the weighted losses on the material itself, if any."""
-    bimodal = options.bimodal * schedule.bimodal(share)
+def _materials(
+    field: MaterialField, sample: Sample, options: DistillOptions, generator: torch.Generator
+) -> tuple[Material, Material | None]:
+    """The material of a sample's points and, for the smoothness loss, of points near them."""
     if options.smoothness == 0:
-        material = field(sample.points)
-        return material, bimodal * regularizers.bimodality(material.metallic) if bimodal else None
+        return field(sample.points), None
     moved = regularizers.displaced(sample.points, sample.normals, generator)
     both = field(torch.cat([sample.points, moved]))
-    parts = [Material(*(values.chunk(2)[i] for values in (both.albedo, both.roughness, both.metallic))) for i in (0, 1)]
-    loss = options.smoothness * regularizers.smoothness(*parts) + bimodal * regularizers.bimodality(parts[0].metallic)
-    return parts[0], loss
+    here, nearby = zip(*(values.chunk(2) for values in (both.albedo, both.roughness, both.metallic)), strict=True)
+    return Material(*here), Material(*nearby)
+
+
+def _regularizer(
+    material: Material, nearby: Material | None, options: DistillOptions, guidance: Guidance, share: float
+) -> Tensor:
+    """The weighted losses on the material itself; `share` is the run's progress."""
+    loss = guidance.dielectric * schedule.dielectric(share) * regularizers.metalness(material.metallic)
+    loss = loss + options.bimodal * schedule.bimodal(share) * regularizers.bimodality(material.metallic)
+    if options.anchor and guidance.start is not None:
+        loss = loss + options.anchor * regularizers.distance_of_means(material, guidance.start)
+    return loss if nearby is None else loss + options.smoothness * regularizers.smoothness(material, nearby)
 
 
 class Clock:
@@ -213,7 +223,7 @@ def _device(options: DistillOptions) -> torch.device:
 def _request(options: DistillOptions, views: Views, guidance: Guidance) -> Provenance:
     chosen = plain_options(options)
     chosen["reference"] = options.reference.name if options.reference else None
-    return Provenance(chosen, options.seed, {"conditions": views.digest, **guidance.inputs}, {
+    return Provenance(chosen, options.seed, {"conditions": views.digest, "prep": views.prep, **guidance.inputs}, {
         "prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments,
     })
 

@@ -61,6 +61,7 @@ class Views:
         cameras = load_npz(folder / "cameras.npz", schemas.CAMERAS)
         self.folder = folder
         self.digest = sha256_file(folder / MANIFEST)
+        self.prep = provenance.inputs.get("prep", "")
         self.c2w, self.fov_y = cameras["c2w"], cameras["fov_y"]
         self.width, self.height = int(cameras["width"]), int(cameras["height"])
         self.environments: list[str] = list(provenance.extra["environments"])

@@ -223,7 +223,7 @@ def light_set(environments: list[Environment]) -> LightSet:
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         squares, shares, texels, cumulative = zip(*pool.map(prepare, range(len(environments))), strict=True)
     pyramid, start = _pyramid(np.concatenate(squares, -1))
-    occupied = (fine[..., 3] > 0).any(-1).reshape(FINE_ROWS // 2, 2, FINE_ROWS, 2).any((1, 3))
+    occupied = np.asarray((fine[..., 3] > 0).any(-1).reshape(FINE_ROWS // 2, 2, FINE_ROWS, 2).any((1, 3)))
     return LightSet(
         tuple(environments),
         pyramid,

@@ -9,6 +9,7 @@ from stages.core.albedo import MIN_COSINE
 from stages.core.frames import camera_rays
 from stages.light.scene import Scene
 
+
 @dataclass(frozen=True)
 class GBuffer:
     """Surface points of a view. P is the count of object pixels, row by row.

@@ -129,9 +129,8 @@ def _chunk(
     occluded = scene.occluded(origin[owner], directions)
     pyramid = (lights.pyramid, lights.level_start)
     excess = (lights.fine, lights.occupied)
-    _accumulate(
-        n, t, b, wo, counts, alphas, light_counts, directions, occluded, begin, albedo_table(), pyramid, excess, out[part]
-    )
+    lobes, rays = (counts, alphas, light_counts), (directions, occluded, begin)
+    _accumulate(n, t, b, wo, *lobes, *rays, albedo_table(), pyramid, excess, out[part])
     _mirror(scene, n, wo, origin, lights, out[part])
 
 

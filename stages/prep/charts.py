@@ -35,8 +35,7 @@ def grow(vertices: NDArray, triangles: NDArray, polygon: NDArray) -> NDArray[np.
     links, length = links[between], length[between]
     smoothed = _smooth(normal_of, links)
     label = _choose(smoothed, links, length)
-    same = label[links[:, 0]] == label[links[:, 1]]
-    region = components(count, links[same])
+    region = _face_one_way(_connected(label, links), _unit(normal_of), area_of, links)
     region = _join_small(region, normal_of, area_of, links, length)
     return renumber(region[polygon])
 
@@ -50,13 +49,6 @@ def project(vertices: NDArray, triangles: NDArray, chart: NDArray) -> NDArray[np
     t, b = _frame(axis)
     points = vertices[triangles]
     return np.stack([(points * side[chart][:, None]).sum(-1) for side in (t, b)], -1)
-
-
-def steep(vertices: NDArray, triangles: NDArray, chart: NDArray) -> NDArray[np.bool_]:
-    """(F,) faces that their chart's projection would squash or turn over."""
-    normal, area = face_normals(vertices, triangles)
-    axis = _unit(_sum(chart, normal * area[:, None], int(chart.max()) + 1))
-    return (normal * axis[chart]).sum(-1) < _STEEPEST
 
 
 def _sum(label: NDArray, values: NDArray, count: int) -> NDArray[np.float64]:
@@ -106,6 +98,24 @@ def _choose(normal: NDArray, links: NDArray, length: NDArray) -> NDArray[np.int6
         best = (fit + _NEIGHBOUR * support.reshape(fit.shape)).argmax(1)
         label = np.where(half ^ bool(sweep % 2), best, label)
     return label
+
+
+def _connected(label: NDArray, links: NDArray) -> NDArray[np.int32]:
+    """Regions of linked polygons with the same label."""
+    return components(len(label), links[label[links[:, 0]] == label[links[:, 1]]])
+
+
+def _face_one_way(region: NDArray, unit: NDArray, area: NDArray, links: NDArray) -> NDArray[np.int32]:
+    """Regions without polygons that would be squashed: those leave, by the direction that they face themselves."""
+    own = (unit @ _directions().T).argmax(1) + 1
+    for _ in range(_SWEEPS):
+        axis = _unit(_sum(region, unit * area[:, None], int(region.max()) + 1))
+        steep = (unit * axis[region]).sum(-1) < _STEEPEST
+        if not steep.any():
+            return region
+        region = _connected(region * (int(own.max()) + 1) + np.where(steep, own, 0), links)
+    alone = int(region.max()) + 1 + np.arange(len(region))
+    return renumber(np.where(steep, alone, region))
 
 
 def _join_small(region: NDArray, normal: NDArray, area: NDArray, links: NDArray, length: NDArray) -> NDArray[np.int32]:

@@ -125,8 +125,8 @@ def weld(points: NDArray, tolerance: float) -> NDArray[np.int64]:
             _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
             near = points[first]
             tree = cKDTree(near)
-        labels = components(len(near), tree.query_pairs(tolerance, output_type="ndarray"))
-        inverse = labels[inverse.reshape(-1)]
+        group = components(len(near), tree.query_pairs(tolerance, output_type="ndarray"))
+        inverse = group.astype(np.int64)[inverse.reshape(-1)]
     representative = np.full(int(inverse.max(initial=-1)) + 1, len(points))
     np.minimum.at(representative, inverse.reshape(-1), np.arange(len(points)))
     return representative[inverse.reshape(-1)]

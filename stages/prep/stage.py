@@ -12,6 +12,7 @@ from stages.core.artifact import Provenance, peek, plain_options, run_log, save_
 from stages.core.errors import InputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
+from stages.prep.measure import topology
 from stages.prep.normals import authored, face_normals, shading_normals
 from stages.prep.options import PrepOptions
 from stages.prep.orient import outward
@@ -58,7 +59,8 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
         loop_uv, kept, layout = _texture(source, working, options, mesh)
         uv = loop_uv[working.loops]
         chart = uv_charts(working.triangles, uv)
-        findings = _findings(source, working, findings, layout) | {
+        measured = topology(working.vertices, working.triangles)
+        findings = _findings(source, working, findings, layout) | measured | {
             "charts": int(chart.max()) + 1,
             "texel_density": _texel_density(working, uv, options.texture_size),
         }

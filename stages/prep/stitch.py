@@ -13,7 +13,8 @@ from stages.prep.overlap import overlapping
 from stages.prep.pack import align, outline
 from stages.prep.topology import edges, renumber
 
-_ROUNDS = 24
+_ROUNDS = 24  # of joining pairs, each of which looks at most triangles anew:
+_EFFORT = 3_000_000  # triangles looked at, after which a large mesh stops; the first rounds save most
 _FILL = 0.7  # share of the texture that bounding boxes and gutters may take when the scale is estimated
 _STRETCH = 0.02  # most that the common edge may differ in length between the two charts
 
@@ -43,7 +44,7 @@ def stitch(
     pairs = pairs[chart[pairs[:, 0] // 3] != chart[pairs[:, 1] // 3]]
     rim = outline(flat, triangles)
     refused = np.zeros(len(pairs), bool)
-    for _ in range(_ROUNDS):
+    for _ in range(min(_ROUNDS, 1 + _EFFORT // len(triangles))):
         size = _sizes(flat, chart, rim)
         gutter = 2 * padding / _scale(size, texture_size, padding)
         hinges = _hinges(flat, chart, pairs, refused, size)
@@ -150,22 +151,24 @@ def _fold(
     turn, shift = _motion(hinges, np.maximum(row, 0))
     joined = np.where(moves[:, None, None], flat @ turn + shift[:, None], flat)
     label = np.where(moves, hinges.fixed[row], chart).astype(np.int32)
-    joined = _snap(joined, triangles, label, moves)
+    reach = _STRETCH * np.linalg.norm(hinges.a[row, 1] - hinges.a[row, 0], axis=-1)
+    joined = _snap(joined, triangles, label, moves, reach)
     for end in (0, 1):  # the hinge itself, also where the fixed chart has its vertices twice
         on_hinge = moves[:, None] & (flat == hinges.b[row, end][:, None]).all(-1)
         joined = np.where(on_hinge[..., None], hinges.a[row, end][:, None], joined)
     return joined, label
 
 
-def _snap(joined: NDArray, triangles: NDArray, label: NDArray, moves: NDArray) -> NDArray[np.float64]:
-    """Corners of moved faces take the exact place of the same vertex in the chart they moved onto, when it is there."""
+def _snap(joined: NDArray, triangles: NDArray, label: NDArray, moves: NDArray, reach: NDArray) -> NDArray[np.float64]:
+    """Corners of moved faces take the exact place of the same vertex in the chart they moved onto, if within reach.
+
+    reach: (F,) the same for all faces of a chart, so that what hung together goes on doing so.
+    """
     key = label.astype(np.int64)[:, None] * (int(triangles.max()) + 1) + triangles
-    still, inverse = np.unique(key[~moves], return_index=True)
-    place = joined[~moves].reshape(-1, 2)[inverse]
-    wanted = key[moves]
-    at = np.minimum(np.searchsorted(still, wanted), len(still) - 1)
-    longest = np.linalg.norm(joined[moves] - np.roll(joined[moves], 1, 1), axis=-1).max(1)[:, None]
-    near = (still[at] == wanted) & (np.linalg.norm(place[at] - joined[moves], axis=-1) <= _STRETCH * longest)
+    still, first = np.unique(key[~moves], return_index=True)
+    place = joined[~moves].reshape(-1, 2)[first]
+    at = np.minimum(np.searchsorted(still, key[moves]), len(still) - 1)
+    near = np.linalg.norm(place[at] - joined[moves], axis=-1) <= reach[moves, None]
     result = joined.copy()
-    result[moves] = np.where(near[..., None], place[at], joined[moves])
+    result[moves] = np.where(((still[at] == key[moves]) & near)[..., None], place[at], joined[moves])
     return result

@@ -6,10 +6,7 @@ share a chart, and charts stand two paddings apart.
 
 import subprocess
 import sys
-import tempfile
-import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,18 +82,20 @@ def _merit(layout: Layout) -> tuple[int, float]:
 
 def run_xatlas(vertices: NDArray, triangles: NDArray, seconds: float) -> tuple[tuple[NDArray, NDArray] | None, str]:
     """Charts by xatlas in a process of its own: ((F, 3, 2) in units of length, (F,) chart or -1) or None, and how."""
-    with tempfile.TemporaryDirectory() as folder:
-        request, answer = Path(folder) / "mesh.npz", Path(folder) / "charts.npz"
-        np.savez(request, vertices=vertices.astype(np.float32), triangles=triangles.astype(np.uint32))
-        command = [sys.executable, xatlas_worker.__file__, str(request), str(answer)]
-        try:
-            subprocess.run(command, timeout=seconds, check=True, capture_output=True)
-            with np.load(answer, allow_pickle=False) as result:
-                return (result["uv"].astype(np.float64), result["chart"]), "xatlas"
-        except subprocess.TimeoutExpired:
-            return None, f"projection: xatlas took more than {seconds:g} s"
-        except (subprocess.CalledProcessError, OSError, zipfile.BadZipFile, KeyError):
-            return None, "projection: xatlas failed"
+    header = np.array([len(vertices), len(triangles)], np.int64)
+    request = header.tobytes() + vertices.astype(np.float32).tobytes() + triangles.astype(np.uint32).tobytes()
+    command = [sys.executable, xatlas_worker.__file__]
+    try:
+        answer = subprocess.run(command, input=request, timeout=seconds, check=True, capture_output=True).stdout
+    except subprocess.TimeoutExpired:
+        return None, f"projection: xatlas took more than {seconds:g} s"
+    except (subprocess.CalledProcessError, OSError):
+        return None, "projection: xatlas failed"
+    corners = 6 * len(triangles)
+    if len(answer) != 4 * (corners + len(triangles)):
+        return None, "projection: xatlas failed"
+    flat = np.frombuffer(answer, np.float32, corners).astype(np.float64).reshape(-1, 3, 2)
+    return (flat, np.frombuffer(answer, np.int32, offset=4 * corners)), "xatlas"
 
 
 def _to_scale(corners: NDArray, flat: NDArray, chart: NDArray) -> NDArray[np.float64]:
@@ -139,27 +138,39 @@ def _whole_polygons(
 def _mend(
     vertices: NDArray, triangles: NDArray, polygon: NDArray, flat: NDArray, chart: NDArray
 ) -> tuple[NDArray, NDArray]:
-    """Split charts that cover themselves and project the pieces, until none is left that can be split."""
+    """Split charts that cover themselves or turn faces over, and project the pieces, until none can be split."""
     flat, chart = flat.copy(), renumber(chart)
     rows = np.arange(len(chart))
     for _ in range(_ROUNDS):
         own = renumber(chart[rows])
         bad = overlapping(flat[rows], own)
+        bad[own[_turned_over(flat[rows], own)]] = True
         rows = rows[bad[own]]
         if not len(rows):
             break
-        pieces = _split(vertices, triangles[rows], polygon[rows], renumber(chart[rows]))
+        own = renumber(chart[rows])
+        pieces = _split(vertices, triangles[rows], polygon[rows], own, _turned_over(flat[rows], own))
         flat[rows] = charts.project(vertices, triangles[rows], pieces)
         chart[rows] = int(chart.max()) + 1 + pieces
     return flat, renumber(chart)
 
 
-def _split(vertices: NDArray, triangles: NDArray, polygon: NDArray, chart: NDArray) -> NDArray[np.int32]:
-    """Each chart cut in two where its polygons differ most in place and direction; pieces hang together."""
+def _turned_over(flat: NDArray, chart: NDArray) -> NDArray[np.bool_]:
+    """(F,) faces that lie the other way up than their chart."""
+    area = signed_area(flat)
+    return area * np.bincount(chart, area)[chart] <= 0
+
+
+def _split(vertices: NDArray, triangles: NDArray, polygon: NDArray, chart: NDArray, over: NDArray) -> NDArray[np.int32]:
+    """Each chart cut in two: faces turned over from the others, or else where polygons differ most in place and
+    direction. Pieces hang together."""
     normal, area = face_normals(vertices, triangles)
     order = np.argsort(chart, kind="stable")
     second = np.zeros(len(chart), np.int64)
     for faces in np.split(order, np.searchsorted(chart[order], np.arange(1, int(chart.max()) + 1))):
+        second[faces] = np.isin(polygon[faces], polygon[faces[over[faces]]])
+        if second[faces].any() and not second[faces].all():
+            continue
         place = vertices[triangles[faces]].mean(1)
         features = np.concatenate([place, normal[faces] * np.linalg.norm(np.ptp(place, axis=0))], -1)
         _, member = np.unique(polygon[faces], return_inverse=True)

@@ -1,7 +1,7 @@
 """xatlas in a process of its own, so that a time limit, or a crash in it, cannot take the program along.
 
-Run as `python xatlas_worker.py IN.npz OUT.npz`; needs nothing of this package. In: `vertices` (V, 3) float32,
-`triangles` (F, 3) uint32. Out: `uv` (F, 3, 2) float32 in units of length, `chart` (F,) int32, -1 for faces without one.
+Run by its path; needs nothing of this package. stdin: V and F as int64, vertices (V, 3) float32, triangles (F, 3)
+uint32. stdout: UVs (F, 3, 2) float32 in units of length, then the chart (F,) int32 of each face, -1 for none.
 """
 
 import sys
@@ -12,10 +12,12 @@ import xatlas
 _TEXELS = 256.0  # xatlas packs what it makes; at this size and without gutters that costs next to nothing
 
 
-def main(request: str, answer: str) -> None:
-    """Make charts for the mesh in `request`, write them to `answer`."""
-    with np.load(request, allow_pickle=False) as mesh:
-        vertices, triangles = mesh["vertices"], mesh["triangles"]
+def main() -> None:
+    """Make charts for the mesh on stdin, write them to stdout."""
+    request = sys.stdin.buffer.read()
+    count, faces = np.frombuffer(request, np.int64, 2)
+    vertices = np.frombuffer(request, np.float32, 3 * count, 16).reshape(-1, 3)
+    triangles = np.frombuffer(request, np.uint32, 3 * faces, 16 + vertices.nbytes).reshape(-1, 3)
     atlas = xatlas.Atlas()
     atlas.add_mesh(vertices, triangles)
     pack = xatlas.PackOptions()
@@ -24,11 +26,11 @@ def main(request: str, answer: str) -> None:
     _, corners, uv = atlas.get_mesh(0)
     sheet, chart = atlas.get_mesh_vertex_assignment(0)
     size = np.array([atlas.width, atlas.height]) / atlas.texels_per_unit
-    labels = np.where(sheet.astype(np.int64) == 0xFFFFFFFF, -1, chart.astype(np.int64)).astype(np.int32)
-    per_corner = labels[corners]
-    whole = (per_corner == per_corner[:, :1]).all(1)
-    np.savez(answer, uv=(uv * size)[corners].astype(np.float32), chart=np.where(whole, per_corner[:, 0], -1))
+    labels = np.where(sheet.astype(np.int64) == 0xFFFFFFFF, -1, chart.astype(np.int64)).astype(np.int32)[corners]
+    whole = (labels == labels[:, :1]).all(1)
+    sys.stdout.buffer.write((uv * size)[corners].astype(np.float32).tobytes())
+    sys.stdout.buffer.write(np.where(whole, labels[:, 0], -1).astype(np.int32).tobytes())
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main()

@@ -29,7 +29,7 @@ CONVERGED = Quality(3072, 512)
 
 @dataclass(frozen=True)
 class Row:
-    """One measurement: error of the six light maps together, tone-mapped by x / (1 + x), over the object, in percent."""
+    """One measurement. Errors: of the six light maps, tone-mapped by x / (1 + x), over the object, in percent."""
 
     quality: str
     lobe_rays: int

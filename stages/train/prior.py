@@ -129,8 +129,9 @@ def train_prior(
         return TrainPriorResult(weights, options.steps, up_to_date=True)
     tiles = Tiles(render_shards(out / "shards", options.shards, options.tiles, options.seed, progress))
     vocabulary = Vocabulary.load(VOCABULARY_FILE)
-    torch.manual_seed(options.seed)  # nn.Module initialisation knows no generator
-    state = State(PriorNetwork(vocabulary.vectors.shape[1]), torch.device(options.device))
+    with torch.random.fork_rng():  # nn.Module initialisation knows only the global generator, which is put back
+        torch.default_generator.manual_seed(options.seed)
+        state = State(PriorNetwork(vocabulary.vectors.shape[1]), torch.device(options.device))
     if not force:
         restore(state, out / "checkpoint.npz", request)
     for losses in optimise(state, tiles, vocabulary, options):

@@ -61,7 +61,7 @@ def open_point(cosine: float, count: int = 1) -> GBuffer:
     far = zeros + np.float32(100)
     mask = np.ones((1, count), bool)
     index = np.zeros(count, np.int32)
-    corner = np.tile(np.float32([1, 0, 0]), (count, 1))
+    corner = np.tile(np.array([1, 0, 0], np.float32), (count, 1))
     return GBuffer(mask, mask.astype(np.float32), far, far, up, up, wo, index, corner)
 
 

@@ -20,6 +20,7 @@ def write_rgb(path: Path, pixels: np.ndarray) -> Path:
         write_exr(path, {c: pixels[..., i] for i, c in enumerate("RGB")})
         return path
     output = oiio.ImageOutput.create(str(path))
+    assert output is not None
     assert output.open(str(path), oiio.ImageSpec(pixels.shape[1], pixels.shape[0], 3, "float"))
     assert output.write_image(pixels)
     output.close()

@@ -49,7 +49,7 @@ def test_error_falls_with_rays() -> None:
 def test_skull_under_a_sun(assets) -> None:  # type: ignore[no-untyped-def]
     import trimesh
 
-    mesh = trimesh.load(assets / "meshes" / "skull.obj", process=False)
+    mesh = trimesh.load_mesh(assets / "meshes" / "skull.obj", process=False)
     vertices = mesh.vertices - mesh.bounds.mean(0)
     vertices = (vertices / np.ptp(vertices, axis=0).max())[:, [2, 0, 1]]
     scene = Scene(vertices, mesh.faces, mesh.vertex_normals[:, [2, 0, 1]][mesh.faces])

@@ -7,6 +7,7 @@ import pytest
 
 from stages.core.errors import InputError
 from stages.core.frames import transform_points
+from stages.prep.measure import topology
 from stages.prep.read_gltf import read_gltf
 from stages.prep.read_obj import read_obj
 from stages.prep.repair import Working, altitude, repair, weld
@@ -134,3 +135,11 @@ def test_weld_of_very_many_points_in_one_place_ends() -> None:
 def test_altitude() -> None:
     corners = np.array([[(0, 0, 0), (4, 0, 0), (1, 3, 0)], [(0, 0, 0), (1, 1, 1), (2, 2, 2)], [(1, 1, 1)] * 3], float)
     np.testing.assert_allclose(altitude(corners), [12 / np.sqrt(18), 0, 0], atol=1e-12)
+
+
+def test_topology_of_a_cube_and_of_a_cube_without_its_lid() -> None:
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))], np.int32)
+    assert topology(corners, faces) == {"non_manifold_vertices": 0, "holes": 0, "genus": 0}
+    assert topology(corners, faces[:-2])["holes"] == 1

@@ -1,7 +1,5 @@
 """New UVs, by either way of making charts: no overlap, full gutters, whole polygons, one scale."""
 
-import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -14,6 +12,7 @@ from stages.prep import charts, unwrap, xatlas_worker
 from stages.prep.overlap import overlapping
 from stages.prep.pack import pack
 from stages.prep.stitch import stitch
+from stages.prep.topology import renumber
 from stages.prep.uv import coverage, overlap, signed_area, uv_charts
 from tests.prep.shapes import cube, sphere
 
@@ -39,7 +38,13 @@ def boxes(count: int) -> tuple[NDArray, NDArray]:
     return np.concatenate(moved), np.concatenate([triangles + 8 * k for k in range(count)])
 
 
-SHAPES = {"cube": cube(), "sphere": sphere(), "spiral": spiral(), "boxes": boxes(10)}
+def stone() -> tuple[NDArray, NDArray]:
+    """A sphere with a rough surface: many charts with crooked borders."""
+    vertices, triangles = sphere(24, 48)
+    return vertices * np.random.default_rng(4).uniform(0.4, 0.6, (len(vertices), 1)), triangles
+
+
+SHAPES = {"cube": cube(), "sphere": sphere(), "spiral": spiral(), "boxes": boxes(10), "stone": stone()}
 
 
 def polygons_of(name: str, triangles: NDArray) -> NDArray:
@@ -57,9 +62,10 @@ def test_a_layout_can_be_baked(name: str, seconds: float) -> None:
     assert overlap(layout.uv) < 1e-3
     assert (signed_area(layout.uv) > 0).all()
     chart = uv_charts(triangles, layout.uv)
+    assert np.array_equal(chart, renumber(layout.chart))  # what is one chart hangs together
     assert all(len(set(chart[polygon == p])) == 1 for p in np.unique(polygon))
     assert layout.packing.gutter == 2 * PADDING
-    assert gap(layout.uv, layout.chart, SIZE) >= 2 * PADDING
+    assert gap(layout.uv, chart, SIZE) >= 2 * PADDING
 
 
 def gap(uv: NDArray, chart: NDArray, size: int) -> float:
@@ -83,6 +89,18 @@ def test_texels_are_spread_evenly(name: str) -> None:
     assert density.max() < 1.03 and density.min() > 0.3
 
 
+def test_polygons_that_charts_cut_become_charts_of_their_own() -> None:
+    """xatlas sees triangles: a quad in two charts, one in none, and one without area in UV are laid flat whole."""
+    vertices, triangles = cube()
+    polygon = np.arange(12) // 2
+    chart = polygon.copy()
+    flat = charts.project(vertices, triangles, chart)
+    chart[1], chart[4:6], flat[7] = 5, -1, 0.0
+    whole, label = unwrap._whole_polygons(vertices, triangles, polygon, flat, chart)
+    assert (label[::2] == label[1::2]).all() and len(set(label)) == 6 and label.min() == 0
+    np.testing.assert_allclose(signed_area(whole), 0.5)
+
+
 def test_the_time_limit_stops_xatlas(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A worker that never ends is killed, and the fallback delivers."""
     slow = tmp_path / "slow.py"
@@ -103,15 +121,15 @@ def test_a_crash_of_xatlas_is_survived(monkeypatch: pytest.MonkeyPatch, tmp_path
     assert unwrap.unwrap(vertices, triangles, np.arange(12), SIZE, PADDING, 5.0).method == "projection: xatlas failed"
 
 
-def test_the_worker_stands_alone(tmp_path: Path) -> None:
-    """It runs by its path, in any folder, and its charts are brought to their true size."""
+def test_xatlas_charts_have_their_true_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The worker runs by its path, in any folder, and its rounding to texels of its own is undone."""
+    monkeypatch.chdir(tmp_path)
     vertices, triangles = cube()
-    np.savez(tmp_path / "in.npz", vertices=vertices.astype("f4"), triangles=triangles.astype("u4"))
-    command = [sys.executable, xatlas_worker.__file__, "in.npz", "out.npz"]
-    subprocess.run(command, check=True, cwd=tmp_path, env={})
-    with np.load(tmp_path / "out.npz") as made:
-        scaled = unwrap._to_scale(vertices[triangles], made["uv"].astype(float), made["chart"])
-    assert np.abs(np.abs(signed_area(made["uv"])) - 0.5).max() < 0.02  # xatlas rounds to its texels
+    made, method = unwrap.run_xatlas(vertices, triangles, 30.0)
+    assert made is not None and method == "xatlas"
+    uv, chart = made
+    assert np.abs(np.abs(signed_area(uv)) - 0.5).max() < 0.02
+    scaled = unwrap._to_scale(vertices[triangles], uv, chart)
     np.testing.assert_allclose(np.abs(signed_area(scaled)), 0.5, rtol=1e-5)
 
 
@@ -150,4 +168,3 @@ def test_growing_charts_keeps_flat_sides_whole() -> None:
     vertices, triangles = cube()
     chart = charts.grow(vertices, triangles, np.arange(12))
     assert len(set(chart)) <= 6 and (chart[::2] == chart[1::2]).all()
-    assert not charts.steep(vertices, triangles, chart).any()

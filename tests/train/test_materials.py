@@ -11,10 +11,10 @@ from stages.train.substances import COLORS, HELD_OUT, SUBSTANCES
 
 def sphere(count: int = 500) -> materials.Surface:
     rng = default_rng(0)
-    normal = rng.normal(size=(count, 3)).astype(np.float32)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    direction = rng.normal(size=(count, 3))
+    normal = (direction / np.linalg.norm(direction, axis=1, keepdims=True)).astype(np.float32)
     flat = rng.uniform(-0.4, 0.6, count).astype(np.float32), rng.uniform(0, 0.8, count).astype(np.float32)
-    return materials.Surface(normal / 2, normal, *flat)
+    return materials.Surface(normal * np.float32(0.5), normal, *flat)
 
 
 @pytest.mark.parametrize("seed", range(30))

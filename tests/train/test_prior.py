@@ -8,12 +8,13 @@ import torch
 
 from stages.core.artifact import load_npz, sha256_file
 from stages.core.errors import NumericalError
+from stages.core.images import read_image
+from stages.core.progress import silent
 from stages.prior.model import VOCABULARY_FILE, PriorNetwork, load_prior
 from stages.prior.text import Vocabulary
-from stages.train import prior, samples
+from stages.train import prior, render, samples
 from stages.train.batches import CaptionBatches, PictureBatches, Tiles
 from stages.train.options import TrainPriorOptions
-from stages.train.render import render_shards
 
 OPTIONS = TrainPriorOptions(
     steps=6, text_steps=2, batch=2, shards=1, tiles=3, seed=3, checkpoint_every=3, sample_every=100
@@ -22,7 +23,9 @@ OPTIONS = TrainPriorOptions(
 
 @pytest.fixture(scope="module")
 def shards(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    return render_shards(tmp_path_factory.mktemp("tiles") / "shards", 1, 3, 3, lambda *_: None)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(render, "LIGHTS", 2)
+        return render.render_shards(tmp_path_factory.mktemp("tiles") / "shards", 1, 3, 3, silent)
 
 
 @pytest.fixture
@@ -111,7 +114,5 @@ def test_sample_sheets_are_pictures(tmp_path: Path, quick: None, shards: list[Pa
     monkeypatch.setattr(samples, "PROMPTS", ("gold", "oak"))
     monkeypatch.setattr(samples, "ROWS", 1)
     samples.write_samples(tmp_path / "sheet.png", done.weights, Tiles(shards), OPTIONS)
-    from stages.core.images import read_image
-
     sheet = read_image(tmp_path / "sheet.png")
     assert sheet.shape == (64, 3 * 64, 3) and sheet.std() > 0.01

@@ -51,7 +51,8 @@ def test_convexity_tells_edges_creases_and_planes() -> None:
     assert abs(plane) < 0.02 and edge > 0.2 and inside_out < -0.2
 
 
-def test_a_shard_is_whole_and_follows_its_seed() -> None:
+def test_a_shard_is_whole_and_follows_its_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(render, "LIGHTS", 1)
     shard = render.render_shard(0, 2, seed=7)
     assert schema_problem(render.SHARD, shard) is None
     again = render.render_shard(0, 2, seed=7)

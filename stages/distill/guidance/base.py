@@ -1,8 +1,8 @@
 """The guidance contract: from rendered images to the gradient with respect to them.
 
 A guidance knows nothing of the material field, and the loop nothing of diffusion or targets. What a step shows comes
-as a `Sample`: object pixels under L lights, with layout, conditions and light transport. A guidance states by its sampler
-whether it wants to see square crops (L = 1) or loose pixels (L = all environments).
+as a `Sample`: object pixels under L lights, with layout, conditions and light transport. A guidance states by its
+sampler whether it wants to see square crops (L = 1) or loose pixels (L = all environments).
 """
 
 from typing import Any, Protocol
@@ -17,12 +17,18 @@ class Guidance(Protocol):
     """What an optimisation step asks.
 
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
-    inputs: role -> SHA-256 of the files it was made from.
+    inputs: role -> SHA-256 of the files it was made from. start: (5,) linear albedo, roughness and metallic from which
+    the field had best begin, or None where it makes no difference. dielectric: weight of `regularizers.metalness`, which
+    decides where the pictures leave open whether something is a metal.
     """
 
-    sampler: Sampler
+    @property
+    def sampler(self) -> Sampler: ...
+
     identity: dict[str, Any]
     inputs: dict[str, str]
+    start: Tensor | None
+    dielectric: float
 
     def gradient(
         self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator
@@ -30,8 +36,8 @@ class Guidance(Protocol):
         """Gradient of this guidance's loss with respect to the rendered pixels.
 
         Args:
-            radiance: (L, P, 3) linear, of the sample's points under its lights; detached. progress: in [0, 1).
+            radiance: (P L, 3) linear, of the sample's points under its lights; detached. progress: in [0, 1).
             generator: a CPU generator, the only source of random numbers.
         Returns:
-            gradient (L, P, 3), scaled to a mean over pixels; and a number for the curve.
+            gradient (P L, 3), scaled to a mean over pixels; and a number for the curve.
         """

@@ -12,6 +12,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from stages.core.color import srgb_decode
 from stages.core.shading import light_maps
 from stages.distill import schedule
 from stages.distill.guidance.csd import classifier_score, posterior_score
@@ -42,10 +43,13 @@ class PriorGuidance:
         self.sampler = sampler
         self.identity: dict[str, Any] = prior.identity
         self.inputs = {"prior": prior.identity["weights"]}
+        self.dielectric = 0.0
         self._prior, self._options = prior, options
         words = ("front view", "side view", "back view", "overhead view")
         self._positive = {word: prior.embed([f"{options.prompt}, {word}"]) for word in words}
         self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
+        expected = prior.expected_material([options.prompt])[0]
+        self.start = torch.cat([srgb_decode(expected[:3]), expected[3:]])
 
     def gradient(
         self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator
@@ -82,7 +86,7 @@ class PriorGuidance:
         positive, null, negative = self._prior.predict_noise(
             x_t.repeat(3, 1, 1, 1), t.repeat(3), conditions.repeat(3, 1, 1, 1), self._text(images)
         ).chunk(3)
-        eta2 = schedule.eta2(progress, options.eta2_start, options.eta2_end)
+        eta2 = schedule.eta2(progress, *options.eta2)
         score = classifier_score(positive, null, negative, options.eta1, eta2)
         return (1 - alpha_bar) * (score + options.posterior * posterior_score(positive, noise))
 

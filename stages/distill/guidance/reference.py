@@ -35,10 +35,15 @@ REACH = 5e-3
 MAX_MISSED = 0.05
 """With a larger share of points off the reference's surface the two are taken for different shapes."""
 
-HUBER = 0.1
+HUBER = 0.03
 """Residual, in nepers of radiance, beyond which the loss grows linearly."""
 
-FLOOR = 0.03
+DIELECTRIC = 0.005
+"""Weight of the pull towards dielectrics. A grey material of albedo c <= 0.04 and metallic m looks exactly like one of
+albedo 0.04 (1 - m) and metallic 1 - c / 0.04, and bright rough ones nearly so; of such a pair the dielectric is meant.
+A sixth of what a residual of `HUBER` weighs, so that no picture that tells them apart is overruled."""
+
+FLOOR = 0.01
 """Radiance at which the logarithmic scale turns linear, as a share of the light's mean over all seen pixels."""
 
 _SRGB = srgb_decode(np.arange(256) / 255.0).astype(np.float32)
@@ -148,6 +153,8 @@ class ReferenceGuidance:
         self.sampler = sampler
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
+        self.start = None
+        self.dielectric = DIELECTRIC
         self._found = torch.from_numpy(found)
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)
         self._floor = FLOOR * self._target.mean((0, 2))  # (L,)

@@ -1,0 +1,21 @@
+"""Topology of the working mesh as PyMeshLab measures it, for the report: what would trouble a modeller."""
+
+import pymeshlab
+from numpy.typing import NDArray
+
+
+def topology(vertices: NDArray, triangles: NDArray) -> dict[str, int | None]:
+    """Non-manifold vertices, holes and genus of a welded mesh; holes and genus are None where it is not two-manifold.
+
+    Args:
+        vertices: (V, 3). triangles: (F, 3).
+    """
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(vertices.astype(float), triangles))
+    found = meshes.get_topological_measures()
+    manifold = found["is_mesh_two_manifold"]
+    return {
+        "non_manifold_vertices": int(found["non_two_manifold_vertices"]),
+        "holes": int(found["number_holes"]) if manifold else None,
+        "genus": int(found["genus"]) if manifold else None,
+    }

@@ -1,0 +1,129 @@
+"""Guidance by a diffusion model, with a model whose answer is known: it wants every picture to be one flat colour."""
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from torch import Tensor
+
+from stages.core.shading import Material, shade
+from stages.distill.guidance.prior import PriorGuidance, view_words
+from stages.distill.options import DistillOptions
+from stages.distill.sampling import CropSampler
+from stages.distill.views import Views
+from stages.prior import profile
+from stages.prior.text import TextEmbedding
+from tests.distill.examples import write_conditions
+
+SIZE = 16
+
+
+@dataclass
+class FlatPrior:
+    """Predicts the noise that is left when the picture is `colour`, for the prompt; no noise at all otherwise."""
+
+    colour: float
+    size: int = SIZE
+    identity: dict[str, Any] = field(default_factory=lambda: {"name": "flat", "weights": "0" * 64})
+    alpha_bar: Tensor = field(default_factory=lambda: torch.linspace(0.999, 0.01, 1000))
+    calls: list[tuple[Tensor, Tensor]] = field(default_factory=list)
+    profile_tone = staticmethod(profile.profile_tone)
+    exposure = staticmethod(profile.exposure)
+    prepare = staticmethod(profile.prepare)
+
+    def embed(self, prompts: list[str]) -> TextEmbedding:
+        kind = [0.0 if p == "" else 2.0 if p == "bad" else 1.0 for p in prompts]
+        tokens = torch.tensor(kind)[:, None, None]
+        return TextEmbedding(tokens, torch.ones(len(prompts), 1, dtype=torch.bool), tokens[:, 0])
+
+    def expected_material(self, prompts: list[str]) -> Tensor:
+        return torch.full((len(prompts), 5), 0.5)
+
+    def predict_noise(self, x_t: Tensor, t: Tensor, conditions: Tensor, text: TextEmbedding) -> Tensor:
+        self.calls.append((t, conditions))
+        a = self.alpha_bar[t][:, None, None, None]
+        wanted = (x_t - a.sqrt() * self.colour) / (1 - a).sqrt()
+        return torch.where(text.pooled[:, :, None, None] == 1.0, wanted, torch.zeros_like(wanted))
+
+
+@pytest.fixture(scope="module")
+def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
+    return Views(write_conditions(tmp_path_factory.mktemp("prior") / "conditions"))
+
+
+def guidance(views: Views, colour: float, batch: int = 2, **options: Any) -> PriorGuidance:
+    chosen = DistillOptions(prompt="flat", negative_prompt="bad", batch=batch, **options)
+    return PriorGuidance(FlatPrior(colour), CropSampler(views, SIZE, batch, torch.device("cpu")), chosen)  # type: ignore[arg-type]
+
+
+def shown(made: PriorGuidance, seed: int = 0) -> tuple[Any, Tensor, torch.Generator]:
+    generator = torch.Generator().manual_seed(seed)
+    sample = made.sampler.draw(generator)
+    count = len(sample.points)
+    return sample, shade(sample.transport, Material(torch.full((count, 3), 0.3), torch.full((count,), 0.5), torch.zeros(count))), generator
+
+
+@pytest.mark.parametrize("colour, sign", [(3.0, -1), (-3.0, 1)])
+def test_descent_moves_the_picture_towards_what_the_model_wants(views: Views, colour: float, sign: int) -> None:
+    """With no weight on the negative branch and the posterior term, mean over many draws, the gradient has one sign."""
+    made = guidance(views, colour, eta1=0.0, eta2=(0.0, 0.0), posterior=1.0)
+    sample, radiance, generator = shown(made)
+    gradients = [made.gradient(radiance, sample, 0.0, generator)[0] for _ in range(4)]
+    assert torch.stack(gradients).mean(0).mul(sign).gt(0).float().mean() > 0.99
+
+
+def test_gradient_is_that_of_the_toned_picture_and_a_mean_over_pixels(views: Views) -> None:
+    made = guidance(views, 0.2, batch=1)
+    sample, radiance, _ = shown(made)
+    gradient, loss = made.gradient(radiance, sample, 0.0, torch.Generator().manual_seed(5))
+    exposure, _ = made._conditions(sample.images, sample)
+    k = float(exposure)
+    slope = 2 * profile.TONE_GAIN * k / (1 + profile.TONE_GAIN * k * radiance) / math.log1p(profile.TONE_GAIN * profile.TONE_WHITE)
+    score = gradient * len(radiance) / slope
+    assert gradient.shape == radiance.shape
+    assert loss == pytest.approx(float((score.square().sum() / (3 * SIZE**2)).sqrt()), rel=1e-3)
+
+
+def test_all_branches_get_the_same_conditions_and_time(views: Views) -> None:
+    made = guidance(views, 0.0)
+    sample, radiance, generator = shown(made)
+    made.gradient(radiance, sample, 0.9, generator)
+    t, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
+    assert conditions.shape == (6, 22, SIZE, SIZE)
+    assert torch.equal(conditions[:2], conditions[2:4]) and torch.equal(conditions[:2], conditions[4:])
+    assert torch.equal(t[:2], t[2:4]) and torch.equal(t[:2], t[4:]) and int(t.max()) <= 500
+
+
+def test_same_generator_same_gradient(views: Views) -> None:
+    made = guidance(views, 0.3)
+    sample, radiance, _ = shown(made)
+    a, b, c = (made.gradient(radiance, sample, 0.1, torch.Generator().manual_seed(s))[0] for s in (1, 1, 2))
+    assert torch.equal(a, b) and not torch.equal(a, c)
+
+
+@pytest.mark.parametrize(
+    "azimuth, elevation, words",
+    [(0, 0, "front view"), (44, 20, "front view"), (90, 0, "side view"), (-90, 0, "side view"), (180, 10, "back view"),
+     (-150, 0, "back view"), (400, 0, "front view"), (0, 75, "overhead view")],
+)
+def test_view_words(azimuth: float, elevation: float, words: str) -> None:
+    assert view_words(math.radians(azimuth), math.radians(elevation)) == words
+
+
+def test_inputs_name_the_weights(views: Views) -> None:
+    assert guidance(views, 0.0).inputs == {"prior": "0" * 64}
+
+
+def test_conditions_files_are_enough(views: Views, tmp_path: Path) -> None:
+    """The light maps that condition the model are those of the shown pixels, exposed like the picture."""
+    made = guidance(views, 0.0, batch=1)
+    sample, _, _ = shown(made)
+    exposure, conditions = made._conditions(sample.images, sample)
+    count = len(sample.points)
+    white = Material(torch.ones(count, 3), torch.ones(count), torch.zeros(count))
+    toned = profile.tone(float(exposure) * shade(sample.transport, white))
+    lit = conditions[0, 4 + 6 : 4 + 9].flatten(1)[:, sample.images.pixel].T  # metallic 0, roughness 1
+    torch.testing.assert_close(lit, toned, rtol=1e-3, atol=1e-4)

@@ -1,0 +1,113 @@
+"""Reference guidance: what it reads of a model, and that it can be satisfied."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+import trimesh
+from PIL import Image
+
+from stages.core.color import srgb_decode
+from stages.core.errors import InputError
+from stages.core.shading import Material, shade
+from stages.distill.guidance.reference import ReferenceAsset, ReferenceGuidance, bilinear
+from stages.distill.sampling import PixelSampler
+from stages.distill.views import Views
+from tests.distill.examples import RADIUS, painted_sphere, write_conditions
+
+CPU = torch.device("cpu")
+IDENTITY = np.eye(4)
+
+
+@pytest.fixture(scope="module")
+def conditions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_conditions(tmp_path_factory.mktemp("reference") / "conditions")
+
+
+def pool(conditions: Path) -> PixelSampler:
+    return PixelSampler(Views(conditions), 64, torch.Generator().manual_seed(0), CPU)
+
+
+def test_bilinear_decodes_before_it_blends_and_repeats() -> None:
+    texture = np.array([[[0], [255]], [[100], [200]]], np.uint8)
+    decode = srgb_decode(np.arange(256) / 255).astype(np.float32)
+    centres = np.array([[0.25, 0.75], [0.75, 0.75], [0.25, 0.25], [1.25, -0.25]])  # v is up, the first row on top
+    expected = decode[[0, 255, 100, 0]]
+    np.testing.assert_allclose(bilinear(texture, centres, decode)[:, 0], expected, atol=1e-6)
+    middle = bilinear(texture, np.array([[0.5, 0.75], [0.0, 0.75]]), decode)[:, 0]
+    np.testing.assert_allclose(middle, [0.5, 0.5], atol=1e-6)  # the mean of linear 0 and 1, also across the edge
+
+
+def test_material_is_that_of_the_point_seen(conditions: Path, tmp_path: Path) -> None:
+    asset = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY)
+    seen = pool(conditions)
+    material, found = asset.material_at(seen.points.numpy(), seen.eyes.numpy())
+    height = seen.points[:, 2].numpy() + RADIUS
+    assert found.all()
+    expected = srgb_decode((60 + 130 * height) / 255)
+    np.testing.assert_allclose(material[:, 1], expected, atol=0.01)  # of the 8-bit texture and the faceted sphere
+    np.testing.assert_allclose(material[:, 3], (200 - 120 * height) / 255, atol=0.01)
+    clear = abs(height - 0.5) > 0.03
+    np.testing.assert_allclose(material[clear, 4], (height > 0.5)[clear], atol=1e-6)
+
+
+def test_factors_multiply_and_stand_in_for_textures(tmp_path: Path) -> None:
+    mesh = trimesh.creation.icosphere(subdivisions=2, radius=RADIUS)
+    plain = trimesh.visual.material.PBRMaterial(baseColorFactor=[255, 128, 0, 255], metallicFactor=0.25, roughnessFactor=0.5)
+    mesh.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(mesh.vertices), 2)), material=plain)
+    path = tmp_path / "plain.glb"
+    path.write_bytes(trimesh.Scene(mesh).export(file_type="glb"))
+    points = mesh.triangles_center[:5]
+    material, found = ReferenceAsset(path, IDENTITY).material_at(points, 3 * points)
+    assert found.all()
+    np.testing.assert_allclose(material, np.tile([1, 128 / 255, 0, 0.5, 0.25], (5, 1)), atol=1e-6)
+
+
+def test_to_world_is_applied(conditions: Path, tmp_path: Path) -> None:
+    """The same sphere ten times as large and moved, with the transform that brings it back."""
+    shift = np.array([3.0, -2.0, 7.0])
+    large = trimesh.creation.icosphere(subdivisions=4, radius=10 * RADIUS)
+    large.apply_translation(shift)
+    grey = Image.new("RGB", (2, 2), (188, 188, 188))
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=grey, metallicFactor=0.0)
+    large.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(large.vertices), 2)), material=material)
+    path = tmp_path / "large.glb"
+    path.write_bytes(trimesh.Scene(large).export(file_type="glb"))
+    to_world = np.diag([0.1, 0.1, 0.1, 1.0])
+    to_world[:3, 3] = -0.1 * shift
+    seen = pool(conditions)
+    found = ReferenceAsset(path, to_world).material_at(seen.points.numpy(), seen.eyes.numpy())[1]
+    assert found.all()
+    with pytest.raises(InputError, match="expected the shape"):
+        ReferenceGuidance(ReferenceAsset(path, IDENTITY), seen)
+
+
+def test_gradient_vanishes_at_the_truth_and_points_to_it(conditions: Path, tmp_path: Path) -> None:
+    asset, seen = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY), pool(conditions)
+    guidance = ReferenceGuidance(asset, seen)
+    generator = torch.Generator().manual_seed(1)
+    sample = seen.draw(generator)
+    assert sample.rows is not None
+    truth = torch.from_numpy(asset.material_at(seen.points.numpy(), seen.eyes.numpy())[0])[sample.rows]
+    radiance = shade(sample.transport, Material(truth[:, :3].contiguous(), truth[:, 3], truth[:, 4]))
+    gradient, loss = guidance.gradient(radiance, sample, 0.0, generator)
+    assert loss < 1e-5 and float(gradient.abs().sum()) < 1e-4
+    for factor, sign in ((1.02, 1), (0.98, -1)):
+        gradient, loss = guidance.gradient(radiance * factor, sample, 0.0, generator)
+        assert loss == pytest.approx(0.02, rel=0.15) and bool((gradient * sign > 0).all())
+
+
+def test_bad_models_are_one_line_errors(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nothing\.glb: no such file"):
+        ReferenceAsset(tmp_path / "nothing.glb", IDENTITY)
+    with pytest.raises(InputError, match=r"mesh\.obj: expected a \.glb"):
+        ReferenceAsset(tmp_path / "mesh.obj", IDENTITY)
+    garbage = tmp_path / "garbage.glb"
+    garbage.write_bytes(b"glTF but not really")
+    with pytest.raises(InputError, match=r"garbage\.glb: not a readable glTF model"):
+        ReferenceAsset(garbage, IDENTITY)
+    bare = tmp_path / "bare.glb"
+    bare.write_bytes(trimesh.Scene(trimesh.creation.icosphere(subdivisions=1)).export(file_type="glb"))
+    with pytest.raises(InputError, match="no metallic-roughness material"):
+        ReferenceAsset(bare, IDENTITY)

@@ -1,0 +1,43 @@
+"""Losses on the material itself."""
+
+import torch
+
+from stages.core.shading import Material
+from stages.distill import regularizers
+
+
+def material(value: float) -> Material:
+    return Material(torch.full((5, 3), value), torch.full((5,), value), torch.full((5,), value))
+
+
+def test_displacement_stays_in_the_tangent_plane_and_has_the_papers_spread() -> None:
+    generator = torch.Generator().manual_seed(0)
+    points, normals = torch.zeros(20000, 3), torch.tensor([[0.0, 0.6, 0.8]]).expand(20000, 3)
+    moved = regularizers.displaced(points, normals, generator)
+    assert (moved * normals).sum(-1).abs().max() < 1e-6
+    assert abs(float(moved.square().sum(-1).mean().sqrt()) / (regularizers.REACH * 2**0.5) - 1) < 0.02
+
+
+def test_smoothness_is_the_squared_distance() -> None:
+    assert float(regularizers.smoothness(material(0.5), material(0.5))) == 0
+    torch.testing.assert_close(regularizers.smoothness(material(0.5), material(0.2)), torch.tensor(5 * 0.09))
+
+
+def test_bimodality_is_zero_at_both_ends_and_pushes_away_from_the_middle() -> None:
+    metallic = torch.tensor([0.0, 1.0, 0.4, 0.6], requires_grad=True)
+    loss = regularizers.bimodality(metallic)
+    assert float(regularizers.bimodality(torch.tensor([0.0, 1.0]))) == 0
+    (gradient,) = torch.autograd.grad(loss, metallic)
+    assert gradient[2] > 0 > gradient[3]
+
+
+def test_metalness_pulls_every_point_alike() -> None:
+    metallic = torch.tensor([0.1, 0.9], requires_grad=True)
+    (gradient,) = torch.autograd.grad(regularizers.metalness(metallic), metallic)
+    assert torch.equal(gradient, torch.tensor([0.5, 0.5]))
+
+
+def test_distance_of_means_lets_points_differ() -> None:
+    spread = Material(torch.tensor([[0.0] * 3, [1.0] * 3]), torch.tensor([0.2, 0.8]), torch.tensor([0.0, 1.0]))
+    assert float(regularizers.distance_of_means(spread, torch.full((5,), 0.5))) < 1e-12
+    assert float(regularizers.distance_of_means(material(0.25), torch.full((5,), 0.5))) > 0.3

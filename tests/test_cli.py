@@ -1,0 +1,133 @@
+"""The command line as a user meets it: help, plans, one-line errors, exit codes, and nothing half-written."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+OK, USAGE, INPUT, ARTIFACT, OUTPUT = 0, 2, 3, 4, 5
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+def dreammat(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Run the command in a process of its own."""
+    command = [sys.executable, "-m", "dreammat_cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300)
+
+
+def expect_error(result: subprocess.CompletedProcess[str], code: int, *words: str) -> None:
+    """One line on stderr that starts with "error:" and holds the words; nothing on stdout; the exit code."""
+    assert result.returncode == code, result.stderr
+    lines = result.stderr.strip().splitlines()
+    assert len(lines) == 1, result.stderr
+    assert lines[0].startswith("error: ")
+    for word in words:
+        assert word in lines[0]
+    assert result.stdout == ""
+
+
+@pytest.fixture
+def mesh(tmp_path: Path) -> Path:
+    path = tmp_path / "triangle.obj"
+    path.write_text(TRIANGLE)
+    return path
+
+
+@pytest.mark.parametrize("command", ("", "prep", "conditions", "distill", "bake", "report conditions", "train prior"))
+def test_help_shows_usage(command: str) -> None:
+    result = dreammat(*command.split(), "--help")
+    assert result.returncode == OK
+    assert result.stdout.startswith("Usage: ")
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, importlib\n"
+        "from dreammat_cli.main import COMMANDS\n"
+        "for name in COMMANDS: importlib.import_module(f'dreammat_cli.{name}')\n"
+        "print([m for m in ('torch', 'numpy', 'numba', 'OpenEXR', 'pymeshlab') if m in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
+
+
+def test_dry_run_writes_nothing(mesh: Path, tmp_path: Path) -> None:
+    result = dreammat("prep", mesh, "-o", tmp_path / "prep.npz", "--dry-run", "--json")
+    assert json.loads(result.stdout)["texture_size"] == 2048
+    assert [p.name for p in tmp_path.iterdir()] == ["triangle.obj"]
+
+
+def test_json_is_all_that_stdout_holds(mesh: Path, tmp_path: Path) -> None:
+    result = dreammat("prep", mesh, "-o", tmp_path / "prep.npz", "--json")
+    assert json.loads(result.stdout)["findings"]["triangles"] == 1
+    again = dreammat("prep", mesh, "-o", tmp_path / "prep.npz", "--json")
+    assert json.loads(again.stdout)["up_to_date"] is True
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("prep",),
+        ("prep", "MESH"),
+        ("prep", "MESH", "-o", "x.npz", "--up", "w"),
+        ("prep", "MESH", "-o", "x.npz", "--nonsense"),
+        ("conditions", "p.npz", "-o", "c", "--views", "0"),
+        ("conditions", "p.npz", "-o", "c", "--fov", "45", "25"),
+        ("distill", "c", "-o", "m.npz", "--guidance", "magic"),
+        ("bake", "p.npz", "m.npz", "-o", "a", "--size", "1000"),
+        ("nonsense",),
+    ],
+)
+def test_wrong_usage(arguments: tuple[str, ...], tmp_path: Path) -> None:
+    expect_error(dreammat(*arguments, cwd=tmp_path), USAGE, "--help")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("empty.obj", b""),
+        ("words.obj", b"no mesh at all\n"),
+        ("points.obj", b"v 0 0 0\nv 1 0 0\n"),
+        ("range.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
+        ("noise.glb", b"glTF" + bytes(40)),
+        ("noise.ply", b"ply\nformat binary_little_endian 1.0\nelement vertex 1000\nproperty float x\nend_header\n"),
+        ("noise.stl", bytes(100)),
+        ("mesh.fbx", b"Kaydara"),
+    ],
+)
+def test_bad_meshes(name: str, content: bytes, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    expect_error(dreammat("prep", name, "-o", "prep.npz", cwd=tmp_path), INPUT, name)
+    assert [p.name for p in tmp_path.iterdir()] == [name]
+
+
+def test_missing_and_foreign_artefacts(mesh: Path, tmp_path: Path) -> None:
+    prep = tmp_path / "prep.npz"
+    assert dreammat("prep", mesh, "-o", prep, "-q").returncode == OK
+    expect_error(dreammat("prep", "gone.obj", "-o", prep, cwd=tmp_path), INPUT, "gone.obj")
+    expect_error(dreammat("conditions", "gone.npz", "-o", "c", cwd=tmp_path), ARTIFACT, "gone.npz")
+    expect_error(dreammat("conditions", mesh, "-o", "c", cwd=tmp_path), ARTIFACT, "triangle.obj")
+    distill = dreammat("distill", tmp_path, "--prompt", "gold", "-o", "m.npz", cwd=tmp_path)
+    expect_error(distill, ARTIFACT, "manifest.json")
+    expect_error(dreammat("bake", prep, prep, "-o", "a", cwd=tmp_path), ARTIFACT, "dreammat.prep", "dreammat.material")
+    prep.write_bytes(prep.read_bytes()[:-200])
+    expect_error(dreammat("conditions", prep, "-o", "c", cwd=tmp_path), ARTIFACT, "prep.npz")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["prep.npz", "prep.npz.run.json", "triangle.obj"]
+
+
+def test_output_that_cannot_be_written(mesh: Path, tmp_path: Path) -> None:
+    expect_error(dreammat("prep", mesh, "-o", mesh / "prep.npz"), OUTPUT, "prep.npz")
+
+
+def test_full_disk(mesh: Path) -> None:
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("needs Linux's /dev/full")
+    from stages.core.artifact import written_atomically
+    from stages.core.errors import OutputError
+
+    with pytest.raises(OutputError, match="no space"), written_atomically(mesh.with_name("a.txt")):
+        full.write_text("x" * 100_000)

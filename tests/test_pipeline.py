@@ -1,0 +1,127 @@
+"""All four stages through the command line: killed at random moments and run again, they end in the same output."""
+
+import hashlib
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+CLOCKED = (".run.json", "run.json", ".curve.csv")
+"""Names whose content tells how long something took."""
+
+
+def cube_sphere(path: Path, count: int = 6) -> None:
+    """A rounded box of quads, as an OBJ without UVs."""
+    t = np.linspace(-1, 1, count + 1)
+    lines, faces, base = [], [], 1
+    for axis in range(3):
+        for side in (-1.0, 1.0):
+            u, v = np.meshgrid(t, t, indexing="ij")
+            points = np.stack(np.broadcast_arrays(u, v, side), -1).reshape(-1, 3)
+            points = np.roll(points, axis, 1)
+            points = points * (0.5 + 0.5 / np.linalg.norm(points, axis=1, keepdims=True))
+            lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
+            for i in range(count):
+                for j in range(count):
+                    square = ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
+                    corners = [base + a * (count + 1) + b for a, b in square]
+                    faces.append("f " + " ".join(map(str, corners if side > 0 else corners[::-1])))
+            base += (count + 1) ** 2
+    path.write_text("\n".join(lines + faces) + "\n")
+
+
+def stages(folder: Path) -> dict[str, list[str]]:
+    """The command of each stage, at a small setting, all paths within a folder."""
+    prep, conditions, material = folder / "prep.npz", folder / "conditions", folder / "material.npz"
+    few = ["--views", "5", "--size", "48", "--env", "overcast", "--env", "studio", "--quality", "draft"]
+    return {
+        "prep": ["prep", str(folder / "mesh.obj"), "-o", str(prep), "--texture-size", "512", "--padding", "4"],
+        "conditions": ["conditions", str(prep), "-o", str(conditions), *few],
+        "distill": ["distill", str(conditions), "--prompt", "red plastic", "-o", str(material), "--steps", "60"],
+        "bake": ["bake", str(prep), str(material), "-o", str(folder / "asset"), "--size", "512", "--preview-size", "48"],
+    }
+
+
+def start(arguments: list[str]) -> subprocess.Popen[bytes]:
+    return subprocess.Popen([sys.executable, "-m", "dreammat_cli", *arguments, "-q"], stderr=subprocess.PIPE)
+
+
+def run(arguments: list[str]) -> float:
+    """Run to the end. Returns: seconds."""
+    begin = time.perf_counter()
+    process = start(arguments)
+    _, error = process.communicate(timeout=300)
+    assert process.returncode == 0, error.decode()
+    return time.perf_counter() - begin
+
+
+def kill_after(arguments: list[str], seconds: float, how: signal.Signals) -> int:
+    """Run, send a signal after some seconds. Returns: the exit code."""
+    process = start(arguments)
+    try:
+        process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        process.send_signal(how)
+        process.communicate(timeout=120)
+    return process.returncode
+
+
+def fingerprint(folder: Path) -> dict[str, str]:
+    files = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.endswith(CLOCKED)]
+    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, float]]:
+    """A folder that an undisturbed run filled, and the seconds of each stage."""
+    folder = tmp_path_factory.mktemp("whole")
+    cube_sphere(folder / "mesh.obj")
+    return folder, {name: run(arguments) for name, arguments in stages(folder).items()}
+
+
+def test_the_asset_is_complete(whole: tuple[Path, dict[str, float]]) -> None:
+    names = {p.name for p in (whole[0] / "asset").iterdir()}
+    assert names >= {
+        "albedo.exr", "roughness.exr", "metallic.exr", "albedo.png", "orm.png", "model.glb", "model.obj", "model.mtl",
+        "preview.png", "bake.json",
+    }  # fmt: skip
+
+
+def test_every_stage_is_then_up_to_date(whole: tuple[Path, dict[str, float]]) -> None:
+    before = fingerprint(whole[0])
+    for arguments in stages(whole[0]).values():
+        command = [sys.executable, "-m", "dreammat_cli", *arguments]
+        result = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
+        assert "up to date" in result.stdout
+    assert fingerprint(whole[0]) == before
+
+
+def test_killed_at_random_and_run_again_ends_in_the_same_bytes(
+    whole: tuple[Path, dict[str, float]], tmp_path: Path
+) -> None:
+    reference, seconds = whole
+    cube_sphere(tmp_path / "mesh.obj")
+    dice = random.Random(20)
+    for name, arguments in stages(tmp_path).items():
+        for how in (signal.SIGKILL, signal.SIGINT, signal.SIGTERM):
+            kill_after(arguments, seconds[name] * dice.uniform(0.2, 0.95), how)
+        run(arguments)
+    assert fingerprint(tmp_path) == fingerprint(reference)
+
+
+def test_an_interrupt_says_how_to_go_on(whole: tuple[Path, dict[str, float]], tmp_path: Path) -> None:
+    cube_sphere(tmp_path / "mesh.obj")
+    run(stages(tmp_path)["prep"])
+    process = start([*stages(tmp_path)["conditions"], "--views", "2000"])
+    deadline = time.monotonic() + 120
+    while not (tmp_path / "conditions" / "view_001").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert error.decode().strip() == "error: interrupted; the same command continues where it stopped"
