@@ -86,7 +86,7 @@ batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: mak
 	$(MAKE) $(patsubst %/prompt.txt,%/asset/bake.json,$(wildcard $(JOBS)/*/prompt.txt))
 
 test: $(VENV)/.ready $(VALIDATOR)  ## all tests
-	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q
+	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .
