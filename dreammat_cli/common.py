@@ -104,7 +104,7 @@ class reporter:
         self.common = common
         self.bar: Bar | None = None
         self.tasks: dict[str, Any] = {}
-        self.started: dict[str, float] = {}
+        self.started: dict[str, tuple[float, int]] = {}
         self.told = time.monotonic()
 
     def __enter__(self) -> Progress:
@@ -124,7 +124,7 @@ class reporter:
     def draw(self, what: str, done: int, total: int) -> None:
         """Progress on a terminal."""
         assert self.bar is not None
-        label = what.split(":")[0]
+        label = what.split(" (")[0]
         if label not in self.tasks:
             self.tasks[label] = self.bar.add_task(what, total=total or None)
         self.bar.update(self.tasks[label], description=what, completed=done, total=total or None)
@@ -132,10 +132,10 @@ class reporter:
     def line(self, what: str, done: int, total: int) -> None:
         """Progress in a log: one line at most every LINE_EVERY seconds."""
         now = time.monotonic()
-        start = self.started.setdefault(what.split(":")[0], now)
+        start, first = self.started.setdefault(what.split(" (")[0], (now, done))
         if now - self.told < LINE_EVERY:
             return
         self.told = now
-        left = f", {(now - start) / done * (total - done):.0f} s left" if 0 < done < total else ""
+        left = f", {(now - start) / (done - first) * (total - done):.0f} s left" if first < done < total else ""
         count = f" {done}/{total}" if total else ""
         click.echo(f"{what}{count}{left}", err=True)

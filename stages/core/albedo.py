@@ -1,8 +1,8 @@
 """Directional albedo of the specular terms: what an open point reflects of an even light of radiance 1.
 
 A table over roughness and N·V, made once by float64 quadrature and shipped with the code; `python -m
-stages.core.albedo` makes it again. The transport integrator normalises its sums with it, and shading interpolates roughness relative
-to it, so that a white furnace comes out exact between knots too.
+stages.core.albedo` makes it again. The transport integrator normalises its sums with it, and shading interpolates
+roughness relative to it, so that a white furnace comes out exact between knots too.
 """
 
 import functools

@@ -15,6 +15,7 @@ from types import FrameType
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from stages.core.artifact import Artifact, Field, Provenance, Schema, load_npz, save_npz
 from stages.core.errors import ArtifactError
@@ -71,7 +72,7 @@ def checkpoint_path(out: Path) -> Path:
 def save(out: Path, state: State, request: Provenance) -> None:
     """Write the checkpoint, atomically."""
     curve = {"loss": np.array(state.loss, np.float32), "seconds": np.array(state.seconds, np.float64)}
-    arrays = {**state.field.to_arrays(), **state.optimizer.to_arrays(), **curve}
+    arrays: dict[str, NDArray] = {**state.field.to_arrays(), **state.optimizer.to_arrays(), **curve}
     save_npz(checkpoint_path(out), CHECKPOINT, arrays, request)
 
 

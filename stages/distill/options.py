@@ -12,7 +12,7 @@ class DistillOptions:
 
     guidance: str = "prior"  # * "prior": the embedded diffusion model; "reference": the known material of a model
     reference: Path | None = None  # * glTF binary or other textured scene, for the reference guidance
-    steps: int = 2000  # * optimiser steps
+    steps: int = 1500  # * optimiser steps
     batch: int = 1  # * images a step, or that many times PIXELS for the reference
     learning_rate: float = 0.01  # * of Adam, at the start
     seed: int = 0  # *
@@ -20,8 +20,8 @@ class DistillOptions:
     smoothness: float = 0.0  # * weight of ‖Γ(p) - Γ(p + ε)‖²
     prompt: str = ""  # what the object is made of
     negative_prompt: str = NEGATIVE_PROMPT  # what the picture should not look like
-    eta1: float = 1.05  # weight of the positive prediction, Eq. 7
-    eta2: tuple[float, float] = (1.0, 0.5)  # of the negative one, at the first step and from two thirds of the steps on
-    posterior: float = 0.0  # share of (eps_pos - noise) added to the classifier score; 0 is the paper's
-    anchor: float = 0.0  # weight of the distance between the mean material and what the words alone call for
-    bimodal: float = 0.0  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end
+    eta1: float = 2.5  # weight of the positive prediction, Eq. 7; the paper's is 1.05
+    eta2: tuple[float, float] = (0.0, 0.0)  # of the negative one, at the start and from two thirds on; paper: 1, 0.5
+    posterior: float = 0.5  # share of (eps_pos - noise) added to the classifier score; 0 is the paper's
+    anchor: float = 0.5  # weight of the distance between the mean material and what the words alone call for
+    bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end

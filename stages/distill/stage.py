@@ -173,8 +173,8 @@ def _regularizer(
 ) -> Tensor:
     """The weighted losses on the material itself; `share` is the run's progress."""
     loss = guidance.dielectric * schedule.dielectric(share) * regularizers.metalness(material.metallic)
-    loss = loss + options.bimodal * schedule.bimodal(share) * regularizers.bimodality(material.metallic)
-    if options.anchor and guidance.start is not None:
+    if guidance.start is not None:  # words decide what a picture leaves open; a known target needs no such help
+        loss = loss + options.bimodal * schedule.bimodal(share) * regularizers.bimodality(material.metallic)
         loss = loss + options.anchor * regularizers.distance_of_means(material, guidance.start)
     return loss if nearby is None else loss + options.smoothness * regularizers.smoothness(material, nearby)
 

@@ -120,9 +120,8 @@ class Views:
     def read_transport(self, key: tuple[int, int]) -> Transport:
         """As `transport` of a (view, environment), always from disk and not kept."""
         view, environment = key
-        mask = np.zeros(self.width * self.height, bool)
-        mask[self._geometry[view].pixels] = True
-        mask = mask.reshape(self.height, self.width)
+        mask = np.zeros((self.height, self.width), bool)
+        mask.ravel()[self._geometry[view].pixels] = True
         transport = read_transport(self.folder, view, self.environments[environment], mask)
         return Transport.unpack(transport.packed().clamp(max=HALF_MAX).half())
 

@@ -63,7 +63,8 @@ def shown(made: PriorGuidance, seed: int = 0) -> tuple[Any, Tensor, torch.Genera
     generator = torch.Generator().manual_seed(seed)
     sample = made.sampler.draw(generator)
     count = len(sample.points)
-    return sample, shade(sample.transport, Material(torch.full((count, 3), 0.3), torch.full((count,), 0.5), torch.zeros(count))), generator
+    grey = Material(torch.full((count, 3), 0.3), torch.full((count,), 0.5), torch.zeros(count))
+    return sample, shade(sample.transport, grey), generator
 
 
 @pytest.mark.parametrize("colour, sign", [(3.0, -1), (-3.0, 1)])
@@ -81,20 +82,29 @@ def test_gradient_is_that_of_the_toned_picture_and_a_mean_over_pixels(views: Vie
     gradient, loss = made.gradient(radiance, sample, 0.0, torch.Generator().manual_seed(5))
     exposure, _ = made._conditions(sample.images, sample)
     k = float(exposure)
-    slope = 2 * profile.TONE_GAIN * k / (1 + profile.TONE_GAIN * k * radiance) / math.log1p(profile.TONE_GAIN * profile.TONE_WHITE)
+    gain = profile.TONE_GAIN
+    slope = 2 * gain * k / (1 + gain * k * radiance) / math.log1p(gain * profile.TONE_WHITE)
     score = gradient * len(radiance) / slope
     assert gradient.shape == radiance.shape
     assert loss == pytest.approx(float((score.square().sum() / (3 * SIZE**2)).sqrt()), rel=1e-3)
 
 
 def test_all_branches_get_the_same_conditions_and_time(views: Views) -> None:
-    made = guidance(views, 0.0)
+    made = guidance(views, 0.0, eta2=(1.0, 0.5))
     sample, radiance, generator = shown(made)
     made.gradient(radiance, sample, 0.9, generator)
     t, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
     assert conditions.shape == (6, 22, SIZE, SIZE)
     assert torch.equal(conditions[:2], conditions[2:4]) and torch.equal(conditions[:2], conditions[4:])
     assert torch.equal(t[:2], t[2:4]) and torch.equal(t[:2], t[4:]) and int(t.max()) <= 500
+
+
+def test_a_negative_prompt_without_weight_is_not_asked(views: Views) -> None:
+    made = guidance(views, 0.0, eta2=(0.0, 0.0))
+    sample, radiance, generator = shown(made)
+    made.gradient(radiance, sample, 0.9, generator)
+    _, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
+    assert conditions.shape == (4, 22, SIZE, SIZE)
 
 
 def test_same_generator_same_gradient(views: Views) -> None:

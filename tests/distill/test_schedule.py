@@ -1,5 +1,7 @@
 """Schedules: the paper's numbers at the paper's steps."""
 
+import itertools
+
 import pytest
 
 from stages.distill import schedule
@@ -23,7 +25,7 @@ def test_control_weakens_gradually(step: int, expected: float) -> None:
 def test_learning_rate_is_held_then_falls_to_its_end() -> None:
     rates = [schedule.learning_rate(i / 1000) for i in range(1000)]
     assert rates[0] == rates[399] == 1.0
-    assert all(a >= b for a, b in zip(rates, rates[1:], strict=False))
+    assert all(a >= b for a, b in itertools.pairwise(rates))
     assert rates[-1] == pytest.approx(schedule.RATE_END, rel=0.01)
 
 

@@ -62,7 +62,8 @@ def test_golden(folder: Path, tmp_path: Path, golden: Golden) -> None:
     assert result.steps == 12 and not result.up_to_date
     arrays = {"albedo": found.albedo, "roughness": found.roughness, "metallic": found.metallic}
     # Adam divides by the gradient's size, so rounding differences of processors grow with the steps
-    golden.check("distill/sphere", {k: v.detach().numpy() for k, v in arrays.items()} | {"loss": material["curve_loss"]}, atol=2e-3)
+    found_values = {name: value.detach().numpy() for name, value in arrays.items()}
+    golden.check("distill/sphere", found_values | {"loss": material["curve_loss"]}, atol=2e-3)
 
 
 def test_finds_the_known_material(folder: Path, tmp_path: Path) -> None:
@@ -77,7 +78,8 @@ def test_finds_the_known_material(folder: Path, tmp_path: Path) -> None:
     truth, _ = reference.ReferenceAsset(folder / "sphere.glb", np.eye(4)).material_at(points.numpy(), eyes)
     away = abs(points[:, 2].numpy()) > 0.06  # the step between dielectric and metal is finer than the views
     found = field(points)
-    error = np.concatenate([found.albedo.detach().numpy() - truth[:, :3], (found.roughness.detach().numpy() - truth[:, 3])[:, None]], 1)
+    roughness = found.roughness.detach().numpy()[:, None]
+    error = np.concatenate([found.albedo.detach().numpy(), roughness], 1) - truth[:, :4]
     assert np.sqrt((error[away, :3] ** 2).mean()) < 0.025
     assert np.sqrt((error[away, 3] ** 2).mean()) < 0.03
     assert np.sqrt(((found.metallic.detach().numpy() - truth[:, 4])[away] ** 2).mean()) < 0.05
@@ -120,7 +122,8 @@ def test_killed_run_continues_from_its_last_checkpoint(folder: Path, tmp_path: P
 def test_foreign_or_damaged_checkpoint_is_not_continued(folder: Path, tmp_path: Path, damage: bytes | None) -> None:
     out, fresh = tmp_path / "material.npz", tmp_path / "fresh.npz"
     with pytest.raises(KeyboardInterrupt):
-        distill(folder / "conditions", out, options(folder, seed=0 if damage is not None else 9), progress=interrupt_at(5, ctrl_c))
+        first = options(folder, seed=0 if damage is not None else 9)
+        distill(folder / "conditions", out, first, progress=interrupt_at(5, ctrl_c))
     if damage is not None:
         checkpoint.checkpoint_path(out).write_bytes(damage)
     assert distill(folder / "conditions", out, options(folder)).resumed == 0
@@ -153,7 +156,9 @@ def test_writes_curve_and_preview_beside(folder: Path, tmp_path: Path) -> None:
     assert lines[0] == "step,seconds,loss" and [line.split(",")[0] for line in lines[1:]] == ["1", "2", "3"]
     assert (tmp_path / "spot.preview.png").stat().st_size > 500
     made = peek(out, MATERIAL)
-    assert made is not None and made.extra["guidance"]["name"] == "reference" and set(made.inputs) == {"conditions", "reference"}
+    assert made is not None
+    assert made.extra["guidance"]["name"] == "reference"
+    assert set(made.inputs) == {"conditions", "prep", "reference"}
 
 
 def test_users_mistakes_are_one_line(folder: Path, tmp_path: Path) -> None:

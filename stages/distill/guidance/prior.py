@@ -49,7 +49,7 @@ class PriorGuidance:
         self._positive = {word: prior.embed([f"{options.prompt}, {word}"]) for word in words}
         self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
         expected = prior.expected_material([options.prompt])[0]
-        self.start = torch.cat([srgb_decode(expected[:3]), expected[3:]])
+        self.start: Tensor | None = torch.cat([srgb_decode(expected[:3]), expected[3:]])
 
     def gradient(
         self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator
@@ -83,15 +83,19 @@ class PriorGuidance:
         noise = torch.randn(picture.shape, generator=generator).to(device)
         alpha_bar = self._prior.alpha_bar[t][:, None, None, None]
         x_t = alpha_bar.sqrt() * picture + (1 - alpha_bar).sqrt() * noise
-        positive, null, negative = self._prior.predict_noise(
-            x_t.repeat(3, 1, 1, 1), t.repeat(3), conditions.repeat(3, 1, 1, 1), self._text(images)
-        ).chunk(3)
         eta2 = schedule.eta2(progress, *options.eta2)
+        branches = 3 if eta2 else 2  # a negative prompt without weight is not asked
+        text = self._text(images, branches)
+        positive, null, *rest = self._prior.predict_noise(
+            x_t.repeat(branches, 1, 1, 1), t.repeat(branches), conditions.repeat(branches, 1, 1, 1), text
+        ).chunk(branches)
+        negative = rest[0] if rest else null
         score = classifier_score(positive, null, negative, options.eta1, eta2)
         return (1 - alpha_bar) * (score + options.posterior * posterior_score(positive, noise))
 
-    def _text(self, images: Images) -> TextEmbedding:
-        """Prompt with view words, no prompt, and negative prompt, for B images each."""
+    def _text(self, images: Images, branches: int) -> TextEmbedding:
+        """Prompt with view words, no prompt, and negative prompt, for B images each; the first `branches` of them."""
         places = zip(np.atleast_1d(images.azimuth), np.atleast_1d(images.elevation), strict=True)
         positive = [self._positive[view_words(float(a), float(e))] for a, e in places]
-        return TextEmbedding.cat([*positive, self._null.expand(images.count), self._negative.expand(images.count)])
+        rest = [self._null, self._negative][: branches - 1]
+        return TextEmbedding.cat([*positive, *(text.expand(images.count) for text in rest)])

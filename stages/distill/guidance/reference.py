@@ -1,8 +1,8 @@
 """Reference guidance: the target is the known material of a textured model of the same shape.
 
 Every shown pixel is shaded once with the field's material and once with the true one, by the same light transport
-under all lights at once, and compared on a logarithmic scale. This is inverse rendering with a perfect denoiser: the honest test
-of shading and gradients, and a way to carry textures over to new UVs.
+under all lights at once, and compared on a logarithmic scale. This is inverse rendering with a perfect denoiser: the
+honest test of shading and gradients, and a way to carry textures over to new UVs.
 
 Only the metallic-roughness material counts: normal maps, emission, occlusion and vertex colours of the model are ignored.
 """
@@ -38,10 +38,10 @@ MAX_MISSED = 0.05
 HUBER = 0.03
 """Residual, in nepers of radiance, beyond which the loss grows linearly."""
 
-DIELECTRIC = 0.005
+DIELECTRIC = 0.001
 """Weight of the pull towards dielectrics. A grey material of albedo c <= 0.04 and metallic m looks exactly like one of
 albedo 0.04 (1 - m) and metallic 1 - c / 0.04, and bright rough ones nearly so; of such a pair the dielectric is meant.
-A sixth of what a residual of `HUBER` weighs, so that no picture that tells them apart is overruled."""
+A fifteenth of what a residual of `HUBER` weighs, so that no picture that tells them apart is overruled."""
 
 FLOOR = 0.01
 """Radiance at which the logarithmic scale turns linear, as a share of the light's mean over all seen pixels."""
@@ -104,9 +104,10 @@ class ReferenceAsset:
     def __init__(self, path: Path, to_world: NDArray) -> None:
         self.path = path
         self._parts: list[_Part] = []
-        vertices, triangles, uv, part = [], [], [], []
+        vertices: list[NDArray] = []
+        triangles, uv, part = [], [], []
         for mesh in _meshes(path):
-            triangles.append(np.asarray(mesh.faces) + sum(map(len, vertices)))
+            triangles.append(np.asarray(mesh.faces) + sum(len(v) for v in vertices))
             vertices.append(transform_points(to_world, np.asarray(mesh.vertices, np.float64)))
             uv.append(_uv(mesh)[mesh.faces])
             part.append(np.full(len(mesh.faces), len(self._parts)))
@@ -153,7 +154,7 @@ class ReferenceGuidance:
         self.sampler = sampler
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
-        self.start = None
+        self.start: Tensor | None = None
         self.dielectric = DIELECTRIC
         self._found = torch.from_numpy(found)
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)
