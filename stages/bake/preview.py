@@ -44,8 +44,8 @@ EXPOSURE = 0.8
 
 COLUMNS = 4
 
-RAYS = Quality(lobe=32, light=4)
-"""Rays that a pixel traces: some grain in the shadows stays."""
+RAYS = Quality(lobe=64, light=12)
+"""Rays that a pixel traces: a little grain in the shadows stays."""
 
 TEXT_HEIGHT = 14
 """Pixels."""

@@ -8,6 +8,7 @@ the same bytes as an uninterrupted one.
 import contextlib
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +25,9 @@ from stages.distill.optimizer import RowAdam
 
 SECONDS = 60.0
 """Time between checkpoints."""
+
+GRACE = 3.0
+"""Seconds within which a second signal is taken for an echo of the first."""
 
 _NETWORK = ("weights_0", "weights_1", "bias_0", "bias_1")
 CHECKPOINT = Schema(
@@ -71,7 +75,7 @@ def checkpoint_path(out: Path) -> Path:
 
 def save(out: Path, state: State, request: Provenance) -> None:
     """Write the checkpoint, atomically."""
-    curve = {"loss": np.array(state.loss, np.float32), "seconds": np.array(state.seconds, np.float64)}
+    curve: dict[str, NDArray] = {"loss": np.array(state.loss, np.float32), "seconds": np.array(state.seconds, np.float64)}
     arrays: dict[str, NDArray] = {**state.field.to_arrays(), **state.optimizer.to_arrays(), **curve}
     save_npz(checkpoint_path(out), CHECKPOINT, arrays, request)
 
@@ -98,19 +102,21 @@ def _fits(stored: Artifact, state: State) -> bool:
 
 @contextlib.contextmanager
 def interruptions() -> Iterator[Callable[[], bool]]:
-    """Within the block a first Ctrl-C or SIGTERM is only noted, so that a step can end; a second one acts at once.
+    """Within the block a first Ctrl-C or SIGTERM is only noted, so that a step can end; a later one acts at once.
+
+    One that follows within `GRACE` is the same request: make and timeout signal a process and then its whole group.
 
     Yields: a function that tells whether one has come. Outside the main thread nothing is changed.
     """
-    noted: list[int] = []
+    noted: list[float] = []
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
 
     def note(number: int, frame: FrameType | None) -> None:
-        if noted:
+        if noted and time.monotonic() - noted[0] > GRACE:
             raise KeyboardInterrupt
-        noted.append(number)
+        noted.append(time.monotonic())
 
     before = {number: signal.signal(number, note) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -12,9 +12,9 @@ class DistillOptions:
 
     guidance: str = "prior"  # * "prior": the embedded diffusion model; "reference": the known material of a model
     reference: Path | None = None  # * glTF binary or other textured scene, for the reference guidance
-    steps: int = 1500  # * optimiser steps
+    steps: int | None = None  # * optimiser steps; None: what the guidance calls for
     batch: int = 1  # * images a step, or that many times PIXELS for the reference
-    learning_rate: float = 0.01  # * of Adam, at the start
+    learning_rate: float | None = None  # * of Adam, at the start; None: what the guidance calls for
     seed: int = 0  # *
     device: str = "cpu"  # * a torch device
     smoothness: float = 0.0  # * weight of ‖Γ(p) - Γ(p + ε)‖²

@@ -123,10 +123,15 @@ class CropSampler:
         return torch.cat([getattr(part, name) for part in parts]).to(self._device)
 
 
+CELL = 2.0
+"""Edge of the cells within which pixels share their chance of being drawn, in pixels."""
+
+
 class PixelSampler:
     """Loose object pixels of all views, each under every environment at once.
 
-    The pool holds all of them, or as many of each view as the byte budget allows, chosen at random.
+    The pool holds all of them, or as many of each view as the byte budget allows, chosen at random. Draws are even over
+    the surface, not over the pixels: a crevice that few views see counts as much as a flank that all of them do.
 
     points, normals, eyes: (M, 3) world; eyes are the cameras' positions.
     """
@@ -140,9 +145,11 @@ class PixelSampler:
         eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
         self.eyes = torch.from_numpy(eyes.astype(np.float32))
         self._lights = _pooled_lights(views, rows)  # (M, L, WIDTH)
+        self._chance = _even_chance(self.points, CELL * views.pixel_size())  # (M,)
 
     def draw(self, generator: torch.Generator) -> Sample:
-        return self.at(torch.randint(len(self.points), (self._count,), generator=generator))
+        u = torch.rand(self._count, generator=generator, dtype=torch.float64)
+        return self.at(torch.searchsorted(self._chance, u).clamp(max=len(self.points) - 1))
 
     def at(self, rows: Tensor) -> Sample:
         """The sample of given rows (P,) of the pool."""
@@ -154,6 +161,15 @@ class PixelSampler:
 
     def prefetch(self, generator: torch.Generator) -> None:
         """Nothing to do: the pool is in memory."""
+
+
+def _even_chance(points: Tensor, cell: float) -> Tensor:
+    """Cumulative chance (M,) of points (M, 3) that makes every occupied cell of a grid as likely as the next."""
+    index = (points / cell).floor().long() + (1 << 20)
+    key = (index[:, 0] << 42) + (index[:, 1] << 21) + index[:, 2]
+    _, cell_of, count = torch.unique(key, return_inverse=True, return_counts=True)
+    chance = (1.0 / count.double())[cell_of].cumsum(0)
+    return chance / chance[-1]
 
 
 def _pool_bytes(views: Views) -> int:

@@ -49,8 +49,8 @@ def bimodal(progress: float) -> float:
     return _ramp(progress, BIMODAL_START, 1.0)
 
 
-def dielectric(progress: float) -> float:
-    """Share of the pull towards dielectrics: set in once metals have formed, and gone before the end."""
+def plain(progress: float) -> float:
+    """Share of the pull towards plain materials: sets in once metals have formed, and is gone before the end."""
     return 0.0 if progress < PULL_START else 1.0 - _ramp(progress, PULL_START, PULL_END)
 
 

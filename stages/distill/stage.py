@@ -1,6 +1,7 @@
 """The distill stage: a conditions folder and a prompt (or a reference) in, a material field out."""
 
 import contextlib
+import dataclasses
 import math
 import time
 from collections import defaultdict
@@ -20,7 +21,7 @@ from stages.core.schemas import MATERIAL
 from stages.core.shading import Material, shade
 from stages.distill import checkpoint, regularizers, schedule
 from stages.distill.checkpoint import State, step_generator
-from stages.distill.guidance.base import Guidance
+from stages.distill.guidance.base import Budget, Guidance
 from stages.distill.optimizer import RowAdam
 from stages.distill.options import DistillOptions
 from stages.distill.preview import write_preview
@@ -29,6 +30,9 @@ from stages.distill.views import Views
 
 SEEN_BY = 3
 """A surface point is taken to be seen by one view in this many."""
+
+POOL = 2**32
+"""In place of a step's number where a pool of pixels is chosen: no step has it."""
 
 
 @dataclass(frozen=True)
@@ -41,30 +45,51 @@ class DistillResult:
     up_to_date: bool
 
 
+@dataclass
+class Run:
+    """One call of `distill`: what stays the same from step to step, and the state that does not."""
+
+    out: Path
+    views: Views
+    guidance: Guidance
+    options: DistillOptions
+    budget: Budget
+    request: Provenance
+    state: State
+    clock: "Clock"
+
+    @property
+    def progress(self) -> float:
+        """Share of the steps done, in [0, 1)."""
+        return self.state.step / self.budget.steps
+
+
 def distill(
     conditions: Path, out: Path, options: DistillOptions, force: bool = False, progress: Progress = silent
 ) -> DistillResult:
     """Optimise a material field until its renderings under all views and lights please the guidance.
 
-    Writes `out` (material.npz), `<stem>.curve.csv` and `<stem>.preview.png` beside it, and while it runs `<out>.checkpoint`,
-    from which the same call continues.
+    Writes `out` (material.npz), `<stem>.curve.csv` and `<stem>.preview.png` beside it, and while it runs
+    `<out>.checkpoint`, from which the same call continues.
 
     Raises: InputError, ArtifactError, OutputError, NumericalError; KeyboardInterrupt after saving a checkpoint.
     """
     device = _device(options)
     views = Views(conditions)
     guidance = make_guidance(options, views, device)
-    request = _request(options, views, guidance)
+    budget = Budget(options.steps or guidance.budget.steps, options.learning_rate or guidance.budget.learning_rate)
+    request = _request(options, budget, views, guidance)
     if not force and (done := peek(out, MATERIAL)) and done.same_request(request):
         checkpoint.checkpoint_path(out).unlink(missing_ok=True)
-        return DistillResult(options.steps, 0, math.nan, True)
+        return DistillResult(budget.steps, 0, math.nan, True)
     with run_log(out) as log:
         state = new_state(options, views, device, guidance.start)
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
-        _run(out, state, guidance, views, options, request, clock, progress)
-        _write(out, state, views, request)
-        write_preview(_beside(out, "preview.png"), views, state.field, device)
+        run = Run(out, views, guidance, options, budget, request, state, clock)
+        _all_steps(run, progress)
+        _write(run)
+        _preview(run)
         log |= {"milliseconds_per_step": clock.per_step(state.step - resumed), "steps": state.step, "resumed": resumed}
     checkpoint.checkpoint_path(out).unlink(missing_ok=True)
     return DistillResult(state.step, resumed, state.loss[-1], False)
@@ -78,7 +103,7 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
         if options.reference is None:
             raise InputError("--guidance reference: no model is given; add --reference MODEL.glb")
         asset = reference.ReferenceAsset(options.reference, views.to_world)
-        chosen = step_generator(options.seed, options.steps)  # a generator that no step uses
+        chosen = step_generator(options.seed, POOL)
         pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device)
         return reference.ReferenceGuidance(asset, pool)
     if options.guidance == "prior":
@@ -101,58 +126,46 @@ def new_state(options: DistillOptions, views: Views, device: torch.device, start
     return State(field, RowAdam(dict(field.named_parameters()), tables=frozenset({"table"})))
 
 
-def _run(
-    out: Path,
-    state: State,
-    guidance: Guidance,
-    views: Views,
-    options: DistillOptions,
-    request: Provenance,
-    clock: "Clock",
-    progress: Progress,
-) -> None:
+def _all_steps(run: Run, progress: Progress) -> None:
     """Do the steps that are left, with a checkpoint now and then and when interrupted."""
-    saved = time.perf_counter()
+    state, saved = run.state, time.perf_counter()
     with checkpoint.interruptions() as interrupted:
         try:
-            while state.step < options.steps:
-                loss = optimisation_step(state, guidance, views, options, clock)
+            while state.step < run.budget.steps:
+                loss = optimisation_step(run)
                 state.loss.append(loss)
-                state.seconds.append(clock.elapsed())
-                progress(f"distill (loss {loss:.4f})", state.step, options.steps)
+                state.seconds.append(run.clock.elapsed())
+                progress(f"distill (loss {loss:.4f})", state.step, run.budget.steps)
                 if interrupted():
                     raise KeyboardInterrupt
                 if time.perf_counter() - saved > checkpoint.SECONDS:
-                    checkpoint.save(out, state, request)
-                    write_preview(_beside(out, "preview.png"), views, state.field, state.field.table.device)
+                    checkpoint.save(run.out, state, run.request)
+                    _preview(run)
                     saved = time.perf_counter()
         except KeyboardInterrupt:
-            checkpoint.save(out, state, request)
+            checkpoint.save(run.out, state, run.request)
             raise
 
 
-def optimisation_step(
-    state: State, guidance: Guidance, views: Views, options: DistillOptions, clock: "Clock"
-) -> float:
+def optimisation_step(run: Run) -> float:
     """One step: draw, shade, ask the guidance, update. Returns: the guidance's number for the curve."""
-    share = state.step / options.steps
+    state, options, clock = run.state, run.options, run.clock
     generator = step_generator(options.seed, state.step)
     with clock("data"):
-        sample = guidance.sampler.draw(generator)
-        guidance.sampler.prefetch(step_generator(options.seed, state.step + 1))
+        sample = run.guidance.sampler.draw(generator)
+        run.guidance.sampler.prefetch(step_generator(options.seed, state.step + 1))
     with clock("field"):
         material, nearby = _materials(state.field, sample, options, generator)
     with clock("shading"):
         radiance = shade(sample.transport, material)
     with clock("guidance"):
-        gradient, loss = guidance.gradient(radiance.detach(), sample, share, generator)
+        gradient, loss = run.guidance.gradient(radiance.detach(), sample, run.progress, generator)
     if not (math.isfinite(loss) and bool(torch.isfinite(gradient).all())):
-        raise NumericalError(_not_finite(state.step, sample, views, options.seed))
+        raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
-        regularizer = _regularizer(material, nearby, options, guidance, share)
-        torch.autograd.backward([radiance, regularizer], [gradient, None])
+        torch.autograd.backward([radiance, _regularizer(material, nearby, run)], [gradient, None])
     with clock("optimiser"):
-        state.optimizer.step(options.learning_rate * schedule.learning_rate(share))
+        state.optimizer.step(run.budget.learning_rate * schedule.learning_rate(run.progress))
     return loss
 
 
@@ -168,13 +181,12 @@ def _materials(
     return Material(*here), Material(*nearby)
 
 
-def _regularizer(
-    material: Material, nearby: Material | None, options: DistillOptions, guidance: Guidance, share: float
-) -> Tensor:
-    """The weighted losses on the material itself; `share` is the run's progress."""
-    loss = guidance.dielectric * schedule.dielectric(share) * regularizers.metalness(material.metallic)
+def _regularizer(material: Material, nearby: Material | None, run: Run) -> Tensor:
+    """The weighted losses on the material itself."""
+    options, guidance, progress = run.options, run.guidance, run.progress
+    loss = guidance.plain * schedule.plain(progress) * regularizers.plainness(material)
     if guidance.start is not None:  # words decide what a picture leaves open; a known target needs no such help
-        loss = loss + options.bimodal * schedule.bimodal(share) * regularizers.bimodality(material.metallic)
+        loss = loss + options.bimodal * schedule.bimodal(progress) * regularizers.bimodality(material.metallic)
         loss = loss + options.anchor * regularizers.distance_of_means(material, guidance.start)
     return loss if nearby is None else loss + options.smoothness * regularizers.smoothness(material, nearby)
 
@@ -209,7 +221,7 @@ def _not_finite(step: int, sample: Sample, views: Views, seed: int) -> str:
 
 def _device(options: DistillOptions) -> torch.device:
     """The torch device asked for, if it works. Raises: InputError."""
-    if options.steps < 1 or options.batch < 1:
+    if (options.steps is not None and options.steps < 1) or options.batch < 1:
         raise InputError(f"--steps {options.steps} --batch {options.batch}: expected 1 or more")
     try:
         device = torch.device(options.device)
@@ -220,22 +232,28 @@ def _device(options: DistillOptions) -> torch.device:
     return device
 
 
-def _request(options: DistillOptions, views: Views, guidance: Guidance) -> Provenance:
-    chosen = plain_options(options)
+def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Guidance) -> Provenance:
+    chosen = plain_options(options) | dataclasses.asdict(budget)
     chosen["reference"] = options.reference.name if options.reference else None
-    return Provenance(chosen, options.seed, {"conditions": views.digest, "prep": views.prep, **guidance.inputs}, {
-        "prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments,
-    })
+    inputs = {"conditions": views.digest, "prep": views.prep, **guidance.inputs}
+    extra = {"prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments}
+    return Provenance(chosen, options.seed, inputs, extra)
 
 
 def _beside(out: Path, ending: str) -> Path:
     return out.with_name(f"{out.stem}.{ending}")
 
 
-def _write(out: Path, state: State, views: Views, request: Provenance) -> None:
+def _preview(run: Run) -> None:
+    field = run.state.field
+    write_preview(_beside(run.out, "preview.png"), run.views, field, field.table.device)
+
+
+def _write(run: Run) -> None:
     """Write the curve, then material.npz."""
+    state, views, request = run.state, run.views, run.request
     lines = [f"{i},{t:.3f},{loss:.6g}" for i, (t, loss) in enumerate(zip(state.seconds, state.loss, strict=True), 1)]
-    write_text(_beside(out, "curve.csv"), "step,seconds,loss\n" + "\n".join(lines) + "\n")
+    write_text(_beside(run.out, "curve.csv"), "step,seconds,loss\n" + "\n".join(lines) + "\n")
     arrays = {
         **state.field.to_arrays(),
         "curve_step": np.arange(1, state.step + 1, dtype=np.int32),
@@ -245,4 +263,4 @@ def _write(out: Path, state: State, views: Views, request: Provenance) -> None:
         "size": np.array([views.width, views.height], np.int32),
     }
     extra = {**request.extra, "field": state.field.config_dict()}
-    save_npz(out, MATERIAL, arrays, Provenance(request.options, request.seed, request.inputs, extra))
+    save_npz(run.out, MATERIAL, arrays, Provenance(request.options, request.seed, request.inputs, extra))

@@ -31,4 +31,4 @@ def test_learning_rate_is_held_then_falls_to_its_end() -> None:
 
 def test_pulls_on_metallic_set_in_late_and_the_one_to_dielectrics_ends() -> None:
     assert schedule.bimodal(0.4) == 0 and schedule.bimodal(1.0) == 1
-    assert schedule.dielectric(0.1) == 0 and schedule.dielectric(0.8) == 0 and schedule.dielectric(0.2) == 1
+    assert schedule.plain(0.1) == 0 and schedule.plain(0.8) == 0 and schedule.plain(0.2) == 1

@@ -5,6 +5,7 @@ as a `Sample`: object pixels under L lights, with layout, conditions and light t
 sampler whether it wants to see square crops (L = 1) or loose pixels (L = all environments).
 """
 
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import torch
@@ -13,13 +14,21 @@ from torch import Tensor
 from stages.distill.sampling import Sample, Sampler
 
 
+@dataclass(frozen=True)
+class Budget:
+    """How long to optimise and how fast. steps: of the optimiser. learning_rate: of Adam, at the start."""
+
+    steps: int
+    learning_rate: float
+
+
 class Guidance(Protocol):
     """What an optimisation step asks.
 
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
     inputs: role -> SHA-256 of the files it was made from. start: (5,) linear albedo, roughness and metallic from which
-    the field had best begin, or None where it makes no difference. dielectric: weight of `regularizers.metalness`, which
-    decides where the pictures leave open whether something is a metal.
+    the field had best begin, or None where it makes no difference. budget: what it calls for where the options leave it
+    open. plain: weight of `regularizers.plainness`, which decides what the pictures leave open.
     """
 
     @property
@@ -28,7 +37,8 @@ class Guidance(Protocol):
     identity: dict[str, Any]
     inputs: dict[str, str]
     start: Tensor | None
-    dielectric: float
+    budget: Budget
+    plain: float
 
     def gradient(
         self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator

@@ -15,11 +15,14 @@ from torch import Tensor
 from stages.core.color import srgb_decode
 from stages.core.shading import light_maps
 from stages.distill import schedule
+from stages.distill.guidance.base import Budget
 from stages.distill.guidance.csd import classifier_score, posterior_score
 from stages.distill.options import DistillOptions
 from stages.distill.sampling import CropSampler, Images, Sample
 from stages.prior.model import Prior
 from stages.prior.text import TextEmbedding
+
+BUDGET = Budget(steps=1500, learning_rate=0.01)
 
 OVERHEAD = math.radians(60)
 FRONT, BACK = math.radians(45), math.radians(135)
@@ -43,7 +46,7 @@ class PriorGuidance:
         self.sampler = sampler
         self.identity: dict[str, Any] = prior.identity
         self.inputs = {"prior": prior.identity["weights"]}
-        self.dielectric = 0.0
+        self.budget, self.plain = BUDGET, 0.0
         self._prior, self._options = prior, options
         words = ("front view", "side view", "back view", "overhead view")
         self._positive = {word: prior.embed([f"{options.prompt}, {word}"]) for word in words}

@@ -23,11 +23,14 @@ from stages.core.color import srgb_decode
 from stages.core.errors import InputError
 from stages.core.frames import transform_points
 from stages.core.shading import Material, shade
+from stages.distill.guidance.base import Budget
 from stages.distill.sampling import PixelSampler, Sample
 from stages.light.scene import Scene
 
-PIXELS = 8192
-"""Pixels a step for each image of the batch."""
+PIXELS = 1024
+"""Pixels a step for each image of the batch: many small steps get further in a given time than few large ones."""
+
+BUDGET = Budget(steps=6000, learning_rate=0.02)
 
 REACH = 5e-3
 """The reference's surface is looked for this far before and behind a seen point, world units."""
@@ -35,16 +38,15 @@ REACH = 5e-3
 MAX_MISSED = 0.05
 """With a larger share of points off the reference's surface the two are taken for different shapes."""
 
+CHUNK = 16384
+"""Pixels whose target is shaded at once."""
+
 HUBER = 0.03
 """Residual, in nepers of radiance, beyond which the loss grows linearly."""
 
-DIELECTRIC = 0.001
-"""Weight of the pull towards dielectrics. A grey material of albedo c <= 0.04 and metallic m looks exactly like one of
-albedo 0.04 (1 - m) and metallic 1 - c / 0.04, and bright rough ones nearly so; of such a pair the dielectric is meant.
-A fifteenth of what a residual of `HUBER` weighs, so that no picture that tells them apart is overruled."""
-
-FLOOR = 0.01
-"""Radiance at which the logarithmic scale turns linear, as a share of the light's mean over all seen pixels."""
+FLOOR = 0.001
+"""Radiance at which the logarithmic scale turns linear, as a share of the light's mean over all seen pixels. The target
+holds no noise, so that what lies deep in the shade tells as much as what lies in the light."""
 
 _SRGB = srgb_decode(np.arange(256) / 255.0).astype(np.float32)
 _BYTE = (np.arange(256) / 255.0).astype(np.float32)
@@ -155,7 +157,7 @@ class ReferenceGuidance:
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
         self.start: Tensor | None = None
-        self.dielectric = DIELECTRIC
+        self.budget, self.plain = BUDGET, 1.0
         self._found = torch.from_numpy(found)
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)
         self._floor = FLOOR * self._target.mean((0, 2))  # (L,)
@@ -177,7 +179,7 @@ class ReferenceGuidance:
 def _target_radiance(sampler: PixelSampler, truth: Tensor) -> Tensor:
     """Radiance (M, L, 3) of the whole pool with the true material (M, 5), in float32."""
     parts = []
-    for rows in torch.arange(len(truth)).split(PIXELS):
+    for rows in torch.arange(len(truth)).split(CHUNK):
         sample, material = sampler.at(rows), truth[rows].to(sampler.device)
         radiance = shade(sample.transport, Material(material[:, :3], material[:, 3], material[:, 4]))
         parts.append(radiance.view(-1, sample.lights, 3).cpu())
