@@ -59,7 +59,7 @@ def cli() -> None:
 
 def main() -> None:
     """Entry point: errors become one line and an exit code; SIGTERM ends like Ctrl-C, in a state that resumes."""
-    signal.signal(signal.SIGTERM, lambda *_: signal.raise_signal(signal.SIGINT))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         cli(standalone_mode=False)
     except DreammatError as error:

@@ -47,8 +47,14 @@ def stages(folder: Path) -> dict[str, list[str]]:
     }
 
 
+def heed_interrupts() -> None:
+    """A shell's background jobs, and so this test's process, may have been told to ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def start(arguments: list[str]) -> subprocess.Popen[bytes]:
-    return subprocess.Popen([sys.executable, "-m", "dreammat_cli", *arguments, "-q"], stderr=subprocess.PIPE)
+    command = [sys.executable, "-m", "dreammat_cli", *arguments, "-q"]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, preexec_fn=heed_interrupts)
 
 
 def run(arguments: list[str]) -> float:

@@ -38,7 +38,7 @@ def test_reads_any_two_to_one_size(tmp_path: Path, suffix: str, rows: int) -> No
     pixels = gradient(rows)
     light, mended = env.load_environment(write_rgb(tmp_path / f"sky{suffix}", pixels))
     assert (light.name, mended, light.radiance.shape) == ("sky", 0, pixels.shape)
-    assert light.radiance == pytest.approx(pixels, abs=pixels.max() / 200)  # RGBE shares an exponent
+    assert light.radiance == pytest.approx(pixels, abs=float(pixels.max()) / 200)  # RGBE shares an exponent
 
 
 def test_mends_and_counts_single_bad_pixels(tmp_path: Path) -> None:
