@@ -5,6 +5,7 @@ VENV   ?= .venv
 RUN    := $(VENV)/bin
 DREAMMAT := $(RUN)/dreammat
 VALIDATOR := $(VENV)/.validator
+MITSUBA := $(VENV)/.mitsuba
 
 # one job: make asset MESH=chair.obj PROMPT="a carved oak chair" OUT=assets/chair
 MESH   ?=
@@ -92,8 +93,14 @@ lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 
-bench: demo/prep.npz  ## speed against error of the light transport
-	$(DREAMMAT) report conditions demo/prep.npz -o bench
+bench: demo/prep.npz | $(MITSUBA)  ## speed against error of the light transport, beside Mitsuba 3 where pip has it
+	$(DREAMMAT) report conditions demo/prep.npz -o bench $$([ -s $(MITSUBA) ] && echo --mitsuba $$(cat $(MITSUBA)))
+	@echo "look at bench/conditions.png"
+
+# Mitsuba in a virtual environment of its own; an empty file where it cannot be had
+$(MITSUBA): | $(VENV)/.ready
+	@$(PYTHON) -m venv $(VENV)/mitsuba && $(VENV)/mitsuba/bin/python -m pip install --quiet mitsuba && \
+	echo $(VENV)/mitsuba/bin/python > $@ || { echo "pip cannot install mitsuba: no side-by-side with it"; : > $@; }
 
 clean:  ## remove the virtual environment and the demo
 	rm -rf $(VENV) demo

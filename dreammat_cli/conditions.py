@@ -24,6 +24,8 @@ DEFAULT = defaults(ConditionsOptions)
               help="Of cameras and rays.")
 @click.option("--quality", type=click.Choice(["draft", "standard", "high"]), default=DEFAULT["quality"],
               show_default=True, help="Rays a point.")
+@click.option("--error", type=click.FloatRange(0, 10), default=DEFAULT["error"], metavar="PERCENT",
+              help="Choose the fewest rays predicted to reach this tone-mapped RMSE, instead of --quality.")
 @click.option("--fov", type=(click.FloatRange(1, 120),) * 2, default=DEFAULT["fov"], show_default=True,
               metavar="LOW HIGH", help="Vertical field of view, degrees.")
 @click.option("--elevation", type=(click.FloatRange(-89, 89),) * 2, default=DEFAULT["elevation"], show_default=True,
@@ -55,7 +57,9 @@ def command(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
     facts = {
         "views": f"{result.made} made, {result.found} found",
         "environments": ", ".join(result.environments),
+        **({"expected error": f"{result.expected_percent:.2f} %"} if result.expected_percent is not None else {}),
         **({"mended texels": ", ".join(f"{n} {c}" for n, c in mended.items())} if mended else {}),
     }
-    data = {"output": str(output), "made": result.made, "found": result.found, "clamped": result.clamped}
+    data = {"output": str(output), "made": result.made, "found": result.found, "clamped": result.clamped,
+            "expected_percent": result.expected_percent}
     show(common, data, [str(output), *lines_of(facts)])

@@ -25,19 +25,16 @@ def command() -> None:
 @click.option("--env", multiple=True, metavar="NAME|FILE", help="As for `conditions`.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 2), default=DEFAULT["seed"], show_default=True,
               help="Of camera and rays.")
+@click.option("--mitsuba", default=DEFAULT["mitsuba"], metavar="PYTHON",
+              help="A Python that has the package mitsuba, for a side-by-side with it.")
 @common_options
 def conditions(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
-    """Light transport of one view of PREP.npz: seconds and error of every quality."""
+    """Light transport of one view of PREP.npz: seconds and error of every setting, and the cost of a step."""
     options = ReportOptions(**chosen)
     if plan(common, "measure into", output, options):
         return
-    from stages.report.conditions import report_conditions
+    from stages.report.conditions import report_conditions, summary
 
     with reporter(common) as progress:
         rows = report_conditions(prep, output, options, progress)
-    head = f"{'quality':10}{'environment':24}{'seconds':>9}{'RMSE %':>9}{'99.9th %':>10}  worst map"
-    lines = [
-        f"{r.quality:10}{r.environment:24}{r.seconds:9.2f}{r.rmse_percent:9.2f}{r.p999_percent:10.2f}  {r.worst_map}"
-        for r in rows
-    ]
-    show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, [head, *lines])
+    show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, summary(rows))

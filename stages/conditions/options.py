@@ -17,6 +17,8 @@ class ConditionsOptions:
     """of cameras and ray directions"""
     quality: str = "standard"
     """rays a point: draft, standard, high"""
+    error: float = 0.0
+    """tone-mapped RMSE, percent, to choose the rays by instead of `quality`; 0 for `quality`"""
     fov: tuple[float, float] = (25.0, 45.0)
     """vertical field of view, degrees"""
     elevation: tuple[float, float] = (-20.0, 45.0)

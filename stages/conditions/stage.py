@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from stages.conditions.cameras import Cameras, place_cameras
 from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
 from stages.conditions.options import ConditionsOptions
+from stages.conditions.predict import choose_quality
 from stages.core.artifact import (
     MANIFEST,
     Provenance,
@@ -41,7 +42,7 @@ from stages.light.environment import Environment, load_environment, save_environ
 from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.lights import BUILTIN
 from stages.light.scene import Scene
-from stages.light.transport import QUALITY, light_transport
+from stages.light.transport import QUALITY, Quality, light_transport
 
 REQUEST = "request.json"
 """What an unfinished folder was asked for; a rerun that asks for the same continues it."""
@@ -49,13 +50,17 @@ REQUEST = "request.json"
 
 @dataclass(frozen=True)
 class ConditionsResult:
-    """What a run did: names of environments, views made now and found made, texels mended, already up to date."""
+    """What a run did: names of environments, views made now and found made, texels mended, already up to date.
+
+    expected_percent: the error that was predicted for the rays chosen by `error`; None where `quality` chose them.
+    """
 
     environments: tuple[str, ...]
     made: int
     found: int
     clamped: dict[str, int]
     up_to_date: bool
+    expected_percent: float | None = None
 
 
 def conditions(
@@ -80,15 +85,20 @@ def conditions(
         for light in lights:
             save_environment(out / "environments" / f"{light.name}.exr", light)
         scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        quality, expected = QUALITY[options.quality], None
+        if options.error:
+            progress("choosing rays", 0, 1)
+            first = trace_view(scene, cameras.c2w[0], float(cameras.fov_y[0]), options.size, options.size)
+            quality, expected = choose_quality(scene, first, lights, options.error, options.seed)
         made = 0
         for view in range(options.views):
             progress("views", view, options.views)
             if not view_is_there(out, view, names, options.maps):
-                trace_and_write(out, view, scene, cameras, lights, options)
+                trace_and_write(out, view, scene, cameras, lights, quality, options)
                 made += 1
         progress("views", options.views, options.views)
         write_sheet(out, sheet(out, names, options.views))
-        log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(QUALITY[options.quality])}
+        log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(quality), "expected_percent": expected}
     extra = {
         "environments": names,
         "views": options.views,
@@ -99,7 +109,7 @@ def conditions(
     files = expected_files(names, options)
     write_manifest(out, CONDITIONS, Provenance(request.options, request.seed, request.inputs, extra), files)
     (out / REQUEST).unlink(missing_ok=True)
-    return ConditionsResult(names, made, options.views - made, clamped, False)
+    return ConditionsResult(names, made, options.views - made, clamped, False, expected)
 
 
 def read_lights(env: tuple[str, ...]) -> tuple[list[Environment], dict[str, int], dict[str, str]]:
@@ -166,14 +176,20 @@ def expected_files(names: tuple[str, ...], options: ConditionsOptions) -> list[s
 
 
 def trace_and_write(
-    out: Path, view: int, scene: Scene, cameras: Cameras, lights: list[Environment], options: ConditionsOptions
+    out: Path,
+    view: int,
+    scene: Scene,
+    cameras: Cameras,
+    lights: list[Environment],
+    quality: Quality,
+    options: ConditionsOptions,
 ) -> None:
     """One view: geometry, then its transport under every environment."""
     c2w = cameras.c2w[view]
     points = trace_view(scene, c2w, float(cameras.fov_y[view]), options.size, options.size)
     geometry = Geometry(points.mask, points.depth, view_normals(points, c2w))
     seed = options.seed * 1_000_003 + view
-    transports = light_transport(scene, points, lights, QUALITY[options.quality], seed)
+    transports = light_transport(scene, points, lights, quality, seed)
     write_geometry(out, view, geometry)
     for light, transport in zip(lights, transports, strict=True):
         check_finite(transport, light.name, view, options.seed)

@@ -9,6 +9,7 @@ open point (`core.albedo`), by a monotone cubic: exact in a white furnace, and a
 under real lights.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,7 +107,7 @@ class _KernelShading(torch.autograd.Function):
     ) -> Tensor:
         from stages.core import shading_kernels  # compiled code is loaded on first use
 
-        light = tuple(t.float().numpy() for t in (transport.E, transport.A, transport.B, transport.cosine))
+        light = tuple(t.float().contiguous().numpy() for t in (transport.E, transport.A, transport.B, transport.cosine))
         material = tuple(t.detach().numpy() for t in (albedo, roughness, metallic))
         radiance, A, by_roughness = shading_kernels.shade(light, material, KNOTS, (F0, LEAST_ALBEDO))  # type: ignore[arg-type]
         ctx.saved = (light[0], A, by_roughness, material)
@@ -122,8 +123,10 @@ class _KernelShading(torch.autograd.Function):
         return None, c, r, m
 
 
-def interpolate(transport: Transport, roughness: Tensor) -> tuple[Tensor, Tensor]:
-    """A and B at the given roughness.
+def interpolate(
+    transport: Transport, roughness: Tensor, kept: Sequence[int] = range(len(KNOTS))
+) -> tuple[Tensor, Tensor]:
+    """A and B at the given roughness, from the knots of the given numbers.
 
     Source: Fritsch & Butland 1984, monotone piecewise cubic interpolation with harmonic-mean slopes.
 
@@ -132,14 +135,16 @@ def interpolate(transport: Transport, roughness: Tensor) -> tuple[Tensor, Tensor
     Returns:
         (P, 3) each. Differentiable in: roughness.
     """
-    knots = torch.tensor(KNOTS, dtype=roughness.dtype, device=roughness.device)
-    last = len(KNOTS) - 1
+    every = torch.tensor(list(kept), device=roughness.device)
+    knots = torch.tensor(KNOTS, dtype=roughness.dtype, device=roughness.device)[every]
+    last = len(knots) - 1
     left = torch.searchsorted(knots, roughness.detach().contiguous(), right=True).sub(1).clamp(0, last - 1)  # (P,)
     near = torch.stack([(left + k).clamp(0, last) for k in (-1, 0, 1, 2)], 1)  # (P, 4)
     r = knots[near]
     row = torch.arange(len(roughness), device=roughness.device)[:, None]
-    stacked = torch.cat([transport.A[row, near], transport.B[row, near]], -1).to(roughness.dtype)  # (P, 4, 6)
-    y = stacked / _knot_albedo(transport.cosine.to(roughness.dtype))[row, near].repeat_interleave(3, -1)
+    place = every[near]
+    stacked = torch.cat([transport.A[row, place], transport.B[row, place]], -1).to(roughness.dtype)  # (P, 4, 6)
+    y = stacked / _knot_albedo(transport.cosine.to(roughness.dtype))[row, place].repeat_interleave(3, -1)
     step = (r[:, 1:] - r[:, :-1])[..., None]  # (P, 3, 1); 0 beyond the ends
     rise = (y[:, 1:] - y[:, :-1]) / torch.where(step > 0, step, torch.ones_like(step))
     slope_left = _slope(rise[:, 0], rise[:, 1], step[:, 0], step[:, 1])

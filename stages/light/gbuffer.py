@@ -1,6 +1,6 @@
 """What a camera sees of the mesh, one point sample at each pixel's centre."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,22 @@ class GBuffer:
     wo: NDArray[np.float32]
     triangle: NDArray[np.int32]
     barycentric: NDArray[np.float32]
+
+    def __getitem__(self, rows: NDArray[np.int64]) -> "GBuffer":
+        """Some of the points, by ascending rows, as a view in which the others are not seen."""
+        mask = np.zeros(self.mask.size, bool)
+        mask[np.flatnonzero(self.mask)[rows]] = True
+        return replace(
+            self,
+            mask=mask.reshape(self.mask.shape),
+            point=self.point[rows],
+            origin=self.origin[rows],
+            n=self.n[rows],
+            ng=self.ng[rows],
+            wo=self.wo[rows],
+            triangle=self.triangle[rows],
+            barycentric=self.barycentric[rows],
+        )
 
 
 def trace_view(scene: Scene, c2w: NDArray, fov_y: float, width: int, height: int) -> GBuffer:

@@ -1,4 +1,4 @@
-"""Light transport E, A(r), B(r) of surface points, with shadows, for several environments from one set of rays.
+"""Light transport E, A(r), B(r) of a view's points, with shadows, for several environments from one set of rays.
 
     E    = ∫ L v (1 - F_d) N·L / π dw             F_d = 0.04 + 0.96 s,  s = (1 - V·H)^5
     A(r) = ∫ L v (1 - s) D_r G_r / (4 N·V) dw     the specular part that F0 multiplies
@@ -12,60 +12,97 @@ every term, every roughness and every environment:
   whole mixture (multiple importance sampling, balance heuristic). Each looks up the bounded part of the light in a
   prefiltered pyramid, at the solid angle the ray stands for. The sum is divided by the sum of its own weights and
   multiplied by the exact unoccluded albedo, so an evenly lit open point has no error at all;
-- what rises above the bound (a sun, a lamp) is sampled in proportion to its energy, by rays of its own, and combined
-  with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles.
+- what rises above the bound (a sun, a lamp) has rays of its own, aimed at what the point would reflect most of, and
+  combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles;
+- neighbouring pixels use complementary samples; the points that turn out noisiest trace more; and what noise is left is
+  averaged over neighbours that do not differ by more than it (`stages.light.reconstruction`).
 
-Source: Veach 1997, ch. 9 (MIS); Křivánek & Colbert 2008, "Real-time Shading with Filtered Importance Sampling".
-The result depends on seed and pixel only, not on threads. `stages.light.reference` is the obvious form.
+Every source of error falls as rays are added; none stays. The result depends on seed and pixel only, not on threads.
+`stages.light.reference` is the obvious form.
+
+Source: Veach 1997, ch. 9 (MIS); Křivánek & Colbert 2008, "Real-time Shading with Filtered Importance Sampling"; Keller &
+Heidrich 2001, "Interleaved Sampling".
 """
 
 import functools
-import math
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from stages.core.albedo import COSINE_STEPS, MIN_COSINE, cosines, diffuse_table, specular_albedo
-from stages.core.brdf import alpha_from_roughness, sample_cosine, sample_vndf, schlick_weight
+from stages.core.albedo import MIN_COSINE, cosines, diffuse_table, specular_albedo
+from stages.core.brdf import alpha_from_roughness
 from stages.core.frames import tangent_frame
 from stages.core.shading import KNOTS, Transport
-from stages.light.environment import (
-    FINE_ROWS,
-    MAX_LIGHTS,
-    SQUARE,
-    Environment,
-    LightSet,
-    direction_to_square,
-    light_set,
-    lookup,
-)
+from stages.light import reconstruction
+from stages.light.environment import Environment, lookup
 from stages.light.gbuffer import GBuffer
+from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
+from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts
 
-CHUNK = 4096
-"""Points a thread takes at once."""
+TILE = 256
+"""Points a thread takes at once: their rays stay in its cache."""
 
-TERMS = 2 * len(KNOTS) - 1
-"""Sums a point keeps: E, then A and B of every knot but the mirror's."""
+STORED = 2 * len(KNOTS) + 1
+"""Sums a point keeps: E, then A and B of every knot."""
+
+MIRROR = (1, 1 + len(KNOTS))
+"""Where among them roughness 0 is. It is looked up, not summed."""
+
+JUDGED = slice(1 + KNOTS.index(0.5), 1 + len(KNOTS))
+"""A at roughness 0.5 and more, by which noise is judged."""
+
+SHARP = [m + 1 for m in MIRROR]
+"""The least rough lobe, which shows edges that no neighbour knows of: left as it was traced."""
+
+SUMMED = np.array([j for j in range(STORED) if j not in MIRROR])
 
 
 @dataclass(frozen=True)
 class Quality:
-    """How many rays a point traces: `lobe` for the mixture of lobes, `light` for each environment's excess."""
+    """How many rays a point traces: `lobe` for the mixture of lobes, `light` for the excess of an average environment.
+
+    The noisiest points trace more, see EXTRA, and what noise is left is smoothed, unless switched off.
+    """
 
     lobe: int
     light: int
+    extra: bool = True
+    smooth: bool = True
+
+    def scaled(self, factor: float) -> "Quality":
+        """About `factor` times as many rays."""
+        return replace(self, lobe=max(2, round(self.lobe * factor)), light=max(2, round(self.light * factor)))
 
 
-QUALITY = {"draft": Quality(32, 4), "standard": Quality(96, 16), "high": Quality(384, 64)}
+EXTRA = ((0.2, 3),)
+"""Share of the points that trace more, and how many times the rays of the others, turn after turn."""
+
+SEED_STEP = 0x5EED
+"""Between the seeds of turns."""
+
+EVEN = 0.35
+"""Share of the light rays that is not given out by demand."""
+
+QUALITY = {"draft": Quality(24, 6), "standard": Quality(48, 14), "high": Quality(256, 72)}
 
 LOBE_SHARES = np.array([0.22, 0.03, 0.05, 0.08, 0.11, 0.14, 0.14, 0.12, 0.11])
 """Share of the lobe rays: the cosine lobe, then each knot but the mirror."""
+
+AIM = np.array([alpha_from_roughness(r) for r in (0.5, 1.0)], np.float32)
+"""Glossy lobes that light rays are aimed for, beside the diffuse one."""
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What a point gathers, for all environments: (P, STORED, CHANNELS) float32, and the variance of each."""
+
+    mean: NDArray[np.float32]
+    variance: NDArray[np.float32]
 
 
 def light_transport(
@@ -98,68 +135,152 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
 
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
     """`light_transport` for lights that are already split."""
-    count, size = len(points.n), len(lights.environments)
-    out = np.zeros((count, size, 2 * len(KNOTS) + 1, 3), np.float32)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        starts = range(0, count, CHUNK)
-        list(pool.map(lambda start: _chunk(scene, points, lights, quality, seed, start, out), starts))
-    tensor = torch.from_numpy(out)
+    sums = trace(scene, points, lights, quality, seed)
+    spent = np.full(len(points.n), float(quality.lobe))
+    for i, (share, factor) in enumerate(EXTRA if quality.extra else ()):
+        worst = reconstruction.noisiest(sums.mean[:, JUDGED], sums.variance[:, JUDGED], int(share * len(points.n)))
+        more = quality.scaled(factor)
+        add(sums, worst, trace(scene, points[worst], lights, more, seed + (i + 1) * SEED_STEP), more.lobe / spent[worst])
+        spent[worst] += more.lobe
+    mean = sums.mean
+    if quality.smooth:
+        sums.variance[:, SHARP] = 0
+        mean = reconstruction.smoothed(mean, sums.variance, reconstruction.Neighbours.of(points))
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
-    k = len(KNOTS)
-    return [Transport(tensor[:, e, 0], tensor[:, e, 1 : k + 1], tensor[:, e, k + 1 :], cosine) for e in range(size)]
+    return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
 
 
-def _chunk(
-    scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int, start: int, out: NDArray
+def _transport(sums: NDArray, cosine: torch.Tensor) -> Transport:
+    E, A, B = torch.from_numpy(sums).split([1, len(KNOTS), len(KNOTS)], 1)
+    return Transport(E[:, 0], A, B, cosine)
+
+
+def add(sums: Sums, rows: NDArray[np.int64], more: Sums, ratio: NDArray[np.float64]) -> None:
+    """Average further rays into some points, in place; `more` stands for `ratio` times the rays of `sums`."""
+    b = (ratio / (1 + ratio)).astype(np.float32)[:, None, None]
+    sums.mean[rows] += b * (more.mean - sums.mean[rows])
+    sums.variance[rows] = (1 - b) ** 2 * sums.variance[rows] + b**2 * more.variance
+
+
+def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> Sums:
+    """The sums of every point by Monte Carlo, each on its own."""
+    mean, gap = np.zeros((2, len(points.n), STORED, CHANNELS), np.float32)
+    rays = Rays.plan(quality, lights, seed)
+    pixel, order = tiles(points.mask)
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
+        list(pool.map(lambda part: _tile(scene, points, lights, rays, pixel[part], part, mean, gap), parts))
+    return Sums(mean, reconstruction.variance(gap, reconstruction.Neighbours.of(points)))
+
+
+def _tile(
+    scene: Scene,
+    points: GBuffer,
+    lights: LightSet,
+    rays: "Rays",
+    pixel: NDArray,
+    part: NDArray,
+    mean: NDArray,
+    gap: NDArray,
 ) -> None:
-    part = slice(start, min(start + CHUNK, len(points.n)))
-    n, wo, origin = points.n[part], points.wo[part], points.origin[part]
-    t, b = tangent_frame(n)
-    counts, alphas = lobe_counts(quality.lobe), knot_alphas()
-    light_counts = np.array([quality.light if share else 0 for share in lights.excess_share], np.int64)
-    cumulative, texels, first = _flat(lights)
-    slots = counts.sum() + light_counts.sum()
-    directions = np.empty((len(n) * slots, 3), np.float32)
-    owner = np.empty(len(n) * slots, np.int32)
-    begin = np.zeros((len(n), 2), np.int64)
-    used = _sample(
-        n, t, b, wo, start, seed, counts, alphas, light_counts, cumulative, texels, first, directions, owner, begin
-    )
-    directions, owner = directions[:used], owner[:used]
-    occluded = scene.occluded(origin[owner], directions)
-    pyramid = (lights.pyramid, lights.level_start)
-    excess = (lights.fine, lights.occupied)
-    lobes, rays = (counts, alphas, light_counts), (directions, occluded, begin)
-    _accumulate(n, t, b, wo, *lobes, *rays, albedo_table(), pyramid, excess, out[part])
-    _mirror(scene, n, wo, origin, lights, out[part])
-
-
-def _flat(lights: LightSet) -> tuple[NDArray, NDArray, NDArray]:
-    sizes = [len(c) for c in lights.cumulative]
-    return (
-        np.concatenate(lights.cumulative),
-        np.concatenate(lights.texels),
-        np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
-    )
+    """The sums of a tile's points, written to rows `part` of `mean` and `gap`."""
+    n, wo, origin, cells = points.n[part], points.wo[part], points.origin[part], lights.cells
+    frame = (n, *tangent_frame(n))
+    alphas, count, slots = knot_alphas(), len(part), len(rays.slots)
+    chosen, aimed = np.empty((2, count, len(cells.energy)), np.float32)
+    aim(n, wo, AIM, (cells.direction, cells.energy), cells.first, chosen, aimed)
+    directions, owner = np.empty((count * slots, 3), np.float32), np.empty(count * slots, np.int32)
+    row = np.empty((count, slots), np.int32)
+    excess = (lights.texels, lights.cumulative, cells.begin, cells.first)
+    samples = (rays.slots, rays.shift, rays.turn, rays.seed)
+    used = draw(*frame, wo, pixel, samples, alphas, excess, chosen, directions, owner, row)
+    directions = directions[:used]
+    occluded = scene.occluded(origin[owner[:used]], directions)
+    seen = (lights.pyramid, lights.level_start, lights.fine, lights.block, rays.density, cells.number, aimed)
+    counts = (rays.counts, rays.bounds)
+    accumulate(*frame, wo, alphas, counts, row, directions, occluded, albedo_table(), seen, (part, SUMMED), mean, gap)
+    mirror = row[:, -1]
+    _mirror(n, wo, directions[mirror], ~occluded[mirror], lights, part, mean)
 
 
 def _mirror(
-    scene: Scene, n: NDArray, wo: NDArray, origin: NDArray, lights: LightSet, out: NDArray
+    n: NDArray, wo: NDArray, wi: NDArray, visible: NDArray, lights: LightSet, part: NDArray, mean: NDArray
 ) -> None:
-    cosine = (n * wo).sum(-1, keepdims=True).astype(np.float64)
-    wi = 2 * cosine * n - wo
-    wi /= np.linalg.norm(wi, axis=-1, keepdims=True)
-    visible = ~scene.occluded(origin, wi.astype(np.float32))
-    s = (1 - cosine.clip(0, 1)) ** 5
+    s = (1 - (n * wo).sum(-1, keepdims=True).astype(np.float64).clip(0, 1)) ** 5
     for e, environment in enumerate(lights.environments):
         radiance = lookup(environment.radiance, wi) * visible[:, None]
-        out[:, e, 1] = (1 - s) * radiance
-        out[:, e, 1 + len(KNOTS)] = s * radiance
+        mean[part, MIRROR[0], 3 * e : 3 * e + 3] = (1 - s) * radiance
+        mean[part, MIRROR[1], 3 * e : 3 * e + 3] = s * radiance
+
+
+def tiles(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Class and number of each object pixel, and an order of the pixels in which neighbours follow each other.
+
+    Returns:
+        pixel: (P, 2). order: (P,).
+    """
+    y, x = np.nonzero(mask)
+    pixel = np.stack([y % 8 * 8 + x % 8, y * mask.shape[1] + x], -1)
+    return pixel, np.lexsort((x, y, x // 16, y // 16))
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Which samples every point draws. A slot is one sample; S slots in all.
+
+    counts: rays of each lobe. slots: (S, 4), lobe (a light's number follows the lobes', -1 is the mirror), number in
+    its lobe, rays of that lobe, place among all light rays. bounds: first slot of the first half's lobe rays, its light
+    rays, the second half's lobe rays, its light rays, and their end. shift: (CLASSES, 2). turn: (CLASSES, S, 2), cosine
+    and sine of a lobe sample's azimuth. density: of a `LightSet`, times each environment's rays.
+    """
+
+    counts: NDArray[np.int64]
+    slots: NDArray[np.int64]
+    bounds: NDArray[np.int64]
+    shift: NDArray[np.float64]
+    turn: NDArray[np.float32]
+    density: NDArray[np.float32]
+    seed: int
+
+    @staticmethod
+    def plan(quality: Quality, lights: LightSet, seed: int) -> "Rays":
+        counts = lobe_counts(quality.lobe)
+        light_counts = share_out(quality.light, lights)
+        lobe = _slots(counts, 0)
+        light = _slots(light_counts, len(counts))
+        groups = [rays[rays[:, 1] % 2 == half] for half in (0, 1) for rays in (lobe, light)]
+        slots = np.concatenate([*groups, [[-1, 0, 1, 0]]])
+        bounds = np.cumsum([0, *map(len, groups)])
+        shift = interleaved_shifts()
+        offset = np.array([hashed(2 * j + 1, seed) for j in slots[:, 0]])
+        azimuth = 2 * np.pi * (shift[:, 1:] + (slots[:, 1] + 1) * GOLDEN + offset)
+        turn = np.stack([np.cos(azimuth), np.sin(azimuth)], -1).astype(np.float32)
+        density = lights.density * np.pad(light_counts, (0, MAX_LIGHTS - len(light_counts))).astype(np.float32)
+        assert turn.shape == (CLASSES, len(slots), 2)
+        return Rays(counts, slots, bounds, shift, turn, density, seed)
+
+
+def share_out(light: int, lights: LightSet) -> NDArray[np.int64]:
+    """Rays of each environment's excess, an even number: `light` on average over those that have any.
+
+    EVEN of them go to all alike, for the penumbrae of suns, the rest by demand.
+    """
+    has_excess = np.diff(lights.cells.first) > 0
+    demand = np.where(has_excess, lights.demand + 1e-9, 0.0)
+    shares = demand / max(demand.sum(), np.finfo(float).tiny) * has_excess.sum()
+    rays = light * (EVEN + (1 - EVEN) * shares)
+    return np.where(has_excess, 2 * np.maximum(1, np.round(rays / 2)), 0).astype(np.int64)
+
+
+def _slots(counts: NDArray, first: int) -> NDArray[np.int64]:
+    rows = [(first + j, i, count) for j, count in enumerate(counts) for i in range(count)]
+    table = np.array(rows, np.int64).reshape(-1, 3)
+    return np.c_[table, np.arange(len(table))]
 
 
 def lobe_counts(total: int) -> NDArray[np.int64]:
-    """Rays of the cosine lobe and of each knot's lobe; every lobe has at least one."""
-    return np.maximum(1, np.round(LOBE_SHARES * total)).astype(np.int64)
+    """Rays of the cosine lobe and of each knot's lobe: an even number, for two halves, and not 0."""
+    return 2 * np.maximum(1, np.round(LOBE_SHARES * total / 2)).astype(np.int64)
 
 
 def knot_alphas() -> NDArray[np.float32]:
@@ -169,215 +290,7 @@ def knot_alphas() -> NDArray[np.float32]:
 
 @functools.lru_cache(maxsize=1)
 def albedo_table() -> NDArray[np.float32]:
-    """Open-point albedo of each sum: (COSINE_STEPS, TERMS) float32, in the order of `_accumulate`."""
+    """Open-point albedo of each sum: (COSINE_STEPS, SUMMED) float32, in the order of `accumulate`."""
     cosine = torch.from_numpy(cosines().astype(np.float32))
     knots = [specular_albedo(torch.full_like(cosine, roughness), cosine).numpy() for roughness in KNOTS[1:]]
     return np.stack([diffuse_table(), *(k[:, 0] for k in knots), *(k[:, 1] for k in knots)], -1)
-
-
-@numba.njit(inline="always", error_model="numpy", cache=True)
-def _hash(x, y):  # type: ignore[no-untyped-def]
-    """Uniform [0, 1) from two integers. Source: Jarzynski & Olano 2020, PCG."""
-    state = np.uint64(x) * np.uint64(747796405) + np.uint64(y) * np.uint64(2891336453) + np.uint64(277803737)
-    state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    state = state ^ (state >> np.uint64(31))
-    return np.float64(state >> np.uint64(11)) * (1.0 / 9007199254740992.0)
-
-
-@numba.njit(error_model="numpy", cache=True, nogil=True)
-def _sample(  # type: ignore[no-untyped-def]
-    n, t, b, wo, start, seed, counts, alphas, light_counts, cumulative, texels, first, directions, owner, begin
-):
-    """Draw every point's directions above its horizon; R2 points, shifted at random for each point and lobe.
-
-    Args:
-        n, t, b, wo: (P, 3) world. directions (rows, 3), owner (rows,), begin (P, 2): written; `begin` holds the first
-        row of a point's lobe rays and of its light rays.
-    Returns:
-        Rows written.
-    """
-    used = 0
-    rows, columns = FINE_ROWS, 2 * FINE_ROWS
-    for p in range(len(n)):
-        begin[p, 0] = used
-        x = wo[p, 0] * t[p, 0] + wo[p, 1] * t[p, 1] + wo[p, 2] * t[p, 2]
-        y = wo[p, 0] * b[p, 0] + wo[p, 1] * b[p, 1] + wo[p, 2] * b[p, 2]
-        z = wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2]
-        for lobe in range(len(counts)):
-            key = (np.int64(seed) * 64 + lobe) * 2
-            shift0, shift1 = _hash(start + p, key), _hash(start + p, key + 1)
-            for i in range(counts[lobe]):
-                u0 = (shift0 + (i + 0.5) / counts[lobe]) % 1.0
-                u1 = (shift1 + (i + 1) * 0.6180339887498949) % 1.0
-                if lobe == 0:
-                    d0, d1, d2 = sample_cosine(u0, u1)
-                else:
-                    m0, m1, m2 = sample_vndf(x, y, z, alphas[lobe - 1], u1, u0)
-                    k = 2 * (x * m0 + y * m1 + z * m2)
-                    d0, d1, d2 = k * m0 - x, k * m1 - y, k * m2 - z
-                if d2 > 0:
-                    for c in range(3):
-                        directions[used, c] = d0 * t[p, c] + d1 * b[p, c] + d2 * n[p, c]
-                    owner[used] = p
-                    used += 1
-        begin[p, 1] = used
-        for e in range(len(light_counts)):
-            energy = cumulative[first[e] : first[e + 1]]
-            key = (np.int64(seed) * 64 + 32 + e) * 2
-            shift0, shift1 = _hash(start + p, key), _hash(start + p, key + 1)
-            for i in range(light_counts[e]):
-                u = (i + shift0) / light_counts[e]
-                j = min(np.searchsorted(energy, u, side="right"), len(energy) - 1)
-                low = energy[j - 1] if j > 0 else 0.0
-                within = (u - low) / (energy[j] - low)
-                texel = texels[first[e] + j]
-                row, column = texel // columns, texel % columns
-                phi = (0.5 - (column + within) / columns) * 2 * math.pi
-                upper, lower = math.cos(row / rows * math.pi), math.cos((row + 1) / rows * math.pi)
-                w2 = upper + (lower - upper) * ((shift1 + (i + 1) * 0.6180339887498949) % 1.0)
-                sin = math.sqrt(max(1 - w2 * w2, 0.0))
-                w0, w1 = sin * math.cos(phi), sin * math.sin(phi)
-                if w0 * n[p, 0] + w1 * n[p, 1] + w2 * n[p, 2] > 0:
-                    directions[used, 0], directions[used, 1], directions[used, 2] = w0, w1, w2
-                    owner[used] = p
-                    used += 1
-    return used
-
-
-@numba.njit(inline="always", error_model="numpy", cache=True)
-def _weights(wo, wi_z, m_x, m_y, m_z, s, counts, a2, lambda_o, weight):  # type: ignore[no-untyped-def]
-    """BRDF terms of one direction into `weight` (TERMS,), and the mixture's density, rays / sr."""
-    f32 = np.float32
-    sin2, cos2 = m_x * m_x + m_y * m_y, m_z * m_z
-    wi2 = wi_z * wi_z
-    tan2 = (f32(1) - wi2) / wi2
-    knots = len(a2)
-    density = f32(counts[0]) * wi_z * f32(1 / math.pi)
-    scale = f32(0.25) / (f32(math.pi) * wo)
-    for k in range(knots):
-        q = sin2 + a2[k] * cos2
-        D = scale * a2[k] / (q * q)
-        lambda_i = f32(0.5) * (math.sqrt(f32(1) + a2[k] * tan2) - f32(1))
-        f = D / (f32(1) + lambda_o[k] + lambda_i)
-        density += f32(counts[k + 1]) * D / (f32(1) + lambda_o[k])
-        weight[1 + k] = (f32(1) - s) * f
-        weight[1 + knots + k] = s * f
-    weight[0] = f32(0.96) * (f32(1) - s) * wi_z * f32(1 / math.pi)
-    return density
-
-
-@numba.njit(inline="always", error_model="numpy", cache=True)
-def _filtered(pyramid, level_start, u, v, level, radiance):  # type: ignore[no-untyped-def]
-    """Trilinear look-up in the octahedral pyramid into `radiance` (C,)."""
-    f32 = np.float32
-    levels = len(level_start)
-    level = min(max(level, f32(0)), f32(levels - 1))
-    low = min(int(level), levels - 2)
-    for c in range(len(radiance)):
-        radiance[c] = 0
-    for step in range(2):
-        share = level - f32(low) if step else f32(1) - (level - f32(low))
-        if share <= 0:
-            continue
-        size = SQUARE >> (low + step)
-        start = level_start[low + step]
-        x, y = f32(u) * f32(size) - f32(0.5), f32(v) * f32(size) - f32(0.5)
-        column, row = int(math.floor(x)), int(math.floor(y))
-        fx, fy = x - f32(column), y - f32(row)
-        for a in range(2):
-            for b in range(2):
-                i, j = row + a, column + b
-                if i < 0 or i >= size:  # across the square's edge the map continues mirrored
-                    i, j = (0 if i < 0 else size - 1), size - 1 - j
-                if j < 0 or j >= size:
-                    i, j = size - 1 - i, (0 if j < 0 else size - 1)
-                weight = share * (fy if a else f32(1) - fy) * (fx if b else f32(1) - fx)
-                texel = pyramid[start + i * size + j]
-                for c in range(len(radiance)):
-                    radiance[c] += weight * texel[c]
-
-
-@numba.njit(inline="always", error_model="numpy", cache=True)
-def _fine_texel(x, y, z):  # type: ignore[no-untyped-def]
-    """Row and column of a direction in the excess grid."""
-    row = int(math.acos(min(max(z, -1.0), 1.0)) * (FINE_ROWS / math.pi))
-    column = int((0.5 - math.atan2(y, x) / (2 * math.pi)) * (2 * FINE_ROWS))
-    return min(row, FINE_ROWS - 1), min(column, 2 * FINE_ROWS - 1)
-
-
-@numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-def _accumulate(  # type: ignore[no-untyped-def]
-    n, t, b, wo, counts, alphas, light_counts, directions, occluded, begin, table, pyramid, excess, out
-):
-    """Sum the rays of each point. out: (P, environments, 2 K + 1, 3), its mirror knots left alone."""
-    f32 = np.float32
-    texels, level_start = pyramid
-    fine, occupied = excess
-    lights, knots = out.shape[1], len(alphas)
-    terms = 2 * knots + 1
-    a2 = alphas * alphas
-    lambda_o = np.empty(knots, np.float32)
-    weight = np.empty(terms, np.float32)
-    normaliser = np.empty(terms, np.float32)
-    radiance = np.empty(texels.shape[1], np.float32)
-    smooth = np.empty((terms, texels.shape[1]), np.float32)
-    bright = np.empty((terms, lights, 3), np.float32)
-    texel_angle = f32(4 * math.pi / (SQUARE * SQUARE))
-    for p in range(len(n)):
-        wo_z = max(wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2], f32(MIN_COSINE * 0.5))
-        tan2 = (f32(1) - min(wo_z, f32(1)) ** 2) / (wo_z * wo_z)
-        for k in range(knots):
-            lambda_o[k] = f32(0.5) * (math.sqrt(f32(1) + a2[k] * tan2) - f32(1))
-        normaliser[:] = 0
-        smooth[:] = 0
-        bright[:] = 0
-        end = begin[p + 1, 0] if p + 1 < len(n) else len(directions)
-        for i in range(begin[p, 0], end):
-            is_light_ray = i >= begin[p, 1]
-            if is_light_ray and occluded[i]:
-                continue
-            d0, d1, d2 = directions[i, 0], directions[i, 1], directions[i, 2]
-            wi_z = max(d0 * n[p, 0] + d1 * n[p, 1] + d2 * n[p, 2], f32(1e-7))
-            h0, h1, h2 = d0 + wo[p, 0], d1 + wo[p, 1], d2 + wo[p, 2]
-            inverse = f32(1) / math.sqrt(h0 * h0 + h1 * h1 + h2 * h2)
-            h0, h1, h2 = h0 * inverse, h1 * inverse, h2 * inverse
-            cosine = h0 * d0 + h1 * d1 + h2 * d2
-            m_x = h0 * t[p, 0] + h1 * t[p, 1] + h2 * t[p, 2]
-            m_y = h0 * b[p, 0] + h1 * b[p, 1] + h2 * b[p, 2]
-            m_z = h0 * n[p, 0] + h1 * n[p, 1] + h2 * n[p, 2]
-            s = f32(schlick_weight(min(cosine, f32(1))))
-            density = _weights(wo_z, wi_z, m_x, m_y, m_z, s, counts, a2, lambda_o, weight)
-            inverse = f32(1) / density
-            if not is_light_ray:
-                for j in range(terms):
-                    normaliser[j] += weight[j] * inverse
-                if occluded[i]:
-                    continue
-                u, v = direction_to_square(d0, d1, d2)
-                level = f32(0.5) * math.log2(inverse / texel_angle)
-                _filtered(texels, level_start, u, v, f32(level), radiance)
-                for j in range(terms):
-                    w = weight[j] * inverse
-                    for c in range(len(radiance)):
-                        smooth[j, c] += w * radiance[c]
-            row, column = _fine_texel(d0, d1, d2)
-            if occupied[row >> 1, column >> 1]:
-                values = fine[row * 2 * FINE_ROWS + column]
-                for e in range(lights):
-                    density += f32(light_counts[e]) * values[e, 3]
-                for e in range(lights):
-                    if values[e, 3] > 0:
-                        for j in range(terms):
-                            for c in range(3):
-                                bright[j, e, c] += weight[j] / density * values[e, c]
-        position = math.sqrt(min(wo_z, f32(1))) * f32(COSINE_STEPS - 1)
-        below = min(int(position), COSINE_STEPS - 2)
-        x = position - f32(below)
-        for j in range(terms):
-            albedo = table[below, j] * (f32(1) - x) + table[below + 1, j] * x
-            scale = albedo / normaliser[j] if normaliser[j] > 0 else f32(0)
-            slot = j if j <= 0 else (j + 1 if j <= knots else j + 2)
-            for e in range(lights):
-                for c in range(3):
-                    out[p, e, slot, c] = smooth[j, 3 * e + c] * scale + bright[j, e, c]

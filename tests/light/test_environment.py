@@ -7,7 +7,6 @@ import OpenImageIO as oiio
 import pytest
 
 from stages.core.artifact import write_exr
-from stages.core.color import luminance
 from stages.core.errors import InputError
 from stages.light import environment as env
 from stages.light.lights import BUILTIN, preview_light
@@ -90,44 +89,6 @@ def test_rolling_the_picture_turns_the_light_about_z() -> None:
     quarter = np.roll(pixels, pixels.shape[1] // 4, 1)  # u grows as azimuth falls
     turned = np.stack([directions[:, 1], -directions[:, 0], directions[:, 2]], -1)
     assert env.lookup(quarter, turned) == pytest.approx(env.lookup(pixels, directions), abs=1e-6)
-
-
-def test_octahedral_map_is_inverted_and_keeps_area() -> None:
-    generator = np.random.default_rng(2)
-    for direction in generator.normal(size=(300, 3)):
-        direction = direction / np.linalg.norm(direction)
-        u, v = env.direction_to_square(*direction)
-        assert 0 <= u <= 1
-        assert 0 <= v <= 1
-        assert env.square_to_direction(u, v) == pytest.approx(tuple(direction), abs=1e-9)
-    z = np.array([env.square_to_direction(u, v)[2] for u, v in generator.random((20_000, 2))])
-    assert np.mean(z > 0.5) == pytest.approx(0.25, abs=0.01)  # a cap of height 0.5 is a quarter of the sphere
-
-
-def test_split_adds_up_and_bounds_the_residual() -> None:
-    pixels = gradient(32)
-    pixels[4, 9] = 60000.0
-    residual, excess = env.split(pixels)
-    assert residual + excess == pytest.approx(pixels, rel=1e-6)
-    assert (excess >= 0).all()
-    assert luminance(residual).max() < 6 * luminance(residual).mean()
-    assert env.split(np.ones((8, 16, 3), np.float32))[1].max() == 0
-
-
-def test_light_set_keeps_the_energy() -> None:
-    pixels = gradient(64)
-    pixels[20, 30] = 5000.0
-    lights = env.light_set([env.Environment("a", pixels)])
-    _, angle = env.directions_of_texels(64, 128)
-    whole = (pixels.astype(np.float64) * angle[:, None, None]).sum((0, 1))
-    _, fine_angle = env.directions_of_texels(env.FINE_ROWS, 2 * env.FINE_ROWS)
-    fine = lights.fine[:, 0, :3].reshape(env.FINE_ROWS, -1, 3).astype(np.float64)
-    excess = (fine * fine_angle[:, None, None]).sum((0, 1))
-    residual = lights.pyramid[-1, :3].astype(np.float64) * 4 * np.pi  # the coarsest level is the mean
-    assert residual + excess == pytest.approx(whole, rel=2e-3)
-    density = (lights.fine[:, 0, 3].reshape(env.FINE_ROWS, -1) * fine_angle[:, None]).sum()
-    assert density == pytest.approx(1, abs=1e-3)
-    assert lights.cumulative[0][-1] == pytest.approx(1)
 
 
 def test_own_lights_are_hdr_and_differ() -> None:

@@ -1,0 +1,86 @@
+"""The sphere on a square: Clarberg's octahedral map, in which every texel covers the same solid angle."""
+
+import math
+
+import numba
+import numpy as np
+
+from stages.light.environment import lookup
+
+
+@numba.njit(inline="always", error_model="numpy", cache=True)
+def direction_to_square(x, y, z):  # type: ignore[no-untyped-def]
+    """Unit direction to [0, 1]^2, area-preserving. Source: Clarberg 2008, "Fast Equal-Area Mapping", Eq. 8-10."""
+    radius = math.sqrt(max(1 - abs(z), 0.0))
+    a, b = abs(x), abs(y)
+    phi = math.atan2(b, a) * (2 / math.pi)
+    v = phi * radius
+    u = radius - v
+    if z < 0:
+        u, v = 1 - v, 1 - u
+    u = u if x >= 0 else -u
+    v = v if y >= 0 else -v
+    return (u + 1) * 0.5, (v + 1) * 0.5
+
+
+@numba.njit(inline="always", error_model="numpy", cache=True)
+def square_to_direction(u, v):  # type: ignore[no-untyped-def]
+    """[0, 1]^2 to a unit direction, the inverse of `direction_to_square`."""
+    u, v = 2 * u - 1, 2 * v - 1
+    a, b = abs(u), abs(v)
+    distance = 1 - (a + b)
+    radius = 1 - abs(distance)
+    phi = ((b - a) / radius + 1) * (math.pi / 4) if radius > 0 else 0.0
+    z = 1 - radius * radius
+    z = z if distance >= 0 else -z
+    scale = radius * math.sqrt(max(2 - radius * radius, 0.0))
+    x, y = math.cos(phi) * scale, math.sin(phi) * scale
+    return (x if u >= 0 else -x), (y if v >= 0 else -y), z
+
+
+@numba.njit(error_model="numpy", cache=True, nogil=True)
+def texel_directions(size):  # type: ignore[no-untyped-def]
+    """Direction of each texel centre of a size x size square: x, y, z, (size, size) each."""
+    result = np.empty((3, size, size))
+    for row in range(size):
+        for column in range(size):
+            x, y, z = square_to_direction((column + 0.5) / size, (row + 0.5) / size)
+            result[0, row, column], result[1, row, column], result[2, row, column] = x, y, z
+    return result
+
+
+@numba.njit(error_model="numpy", cache=True, nogil=True)
+def octahedral(radiance, size, oversample):  # type: ignore[no-untyped-def]
+    """The light on the octahedral square, each texel the mean of oversample^2 look-ups; black parts are passed over.
+
+    Args: radiance (H, W, 3). Returns: (size, size, 3) float32.
+    """
+    height, width, _ = radiance.shape
+    result = np.zeros((size, size, 3), np.float32)
+    reach = 2 + 4 * height // size  # texels of the light that one of the square can touch, and more
+    coarse = np.zeros((height // reach + 3, width // reach + 3), np.bool_)  # cells with light in them or near them
+    for row in range(height):
+        for column in range(width):
+            if radiance[row, column].max() > 0:
+                a, b = row // reach + 1, column // reach + 1
+                coarse[a - 1 : a + 2, b - 1 : b + 2] = True
+    coarse[:, :2] = coarse[:, -3:] = True  # the seam
+    w = np.empty((oversample * oversample, 3))
+    for row in range(size):
+        for column in range(size):
+            x, y, z = square_to_direction((column + 0.5) / size, (row + 0.5) / size)
+            u = (0.5 - math.atan2(y, x) / (2 * math.pi)) * width
+            v = math.acos(min(max(z, -1.0), 1.0)) / math.pi * height
+            polar = abs(z) > 1 - 8.0 / size  # here a texel spans many columns
+            if not polar and not coarse[int(v) // reach + 1, int(u) // reach + 1]:
+                continue
+            for a in range(oversample):
+                for b in range(oversample):
+                    i = a * oversample + b
+                    w[i, 0], w[i, 1], w[i, 2] = square_to_direction(
+                        (column + (b + 0.5) / oversample) / size, (row + (a + 0.5) / oversample) / size
+                    )
+            values = lookup(radiance, w)
+            for c in range(3):
+                result[row, column, c] = values[:, c].mean()
+    return result

@@ -1,0 +1,165 @@
+"""Taking the Monte Carlo noise out of a view's sums by its own estimate of that noise.
+
+The rays of a point come in two halves; their difference tells the variance. A sum is replaced by a weighted mean over
+the window around its pixel, of those neighbours that lie on the same surface and differ from it by no more than noise
+explains. Where nothing is noisy nothing changes, so the bias falls with the variance.
+
+Source: Rousselle, Knaus & Zwicker 2012, "Adaptive Rendering with Non-Local Means Filtering" (two halves, acceptance by
+variance).
+"""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.light.gbuffer import GBuffer
+
+RADIUS = 2
+"""Of the window, pixels: it holds every class of a 4 x 4 block of interleaved samples at least once."""
+
+TOLERANCE = 12.0
+"""A neighbour counts for nothing when its squared difference exceeds this many times the sum of both variances; its own
+is taken for no more than the point's, so that noise does not flow to where there is none."""
+
+NORMALS = 100.0
+"""Squared difference of unit normals, inverse, at which a neighbour counts for nothing: 7 degrees."""
+
+BEND = 0.1
+"""Squared sine of the angle out of the tangent plane at which a neighbour counts for nothing: 18 degrees."""
+
+BLOCK = 4
+"""Side, in pixels, of the blocks over which variance is averaged."""
+
+POINTS_PER_TASK = 4096
+
+fast = numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Where points lie in the image. index: (H, W) row of a pixel's point or -1. pixel: (P, 2), x and y. n, point."""
+
+    index: NDArray[np.int32]
+    pixel: NDArray[np.int32]
+    n: NDArray[np.float32]
+    point: NDArray[np.float32]
+
+    @staticmethod
+    def of(points: GBuffer) -> "Neighbours":
+        y, x = np.nonzero(points.mask)
+        index = np.full(points.mask.shape, -1, np.int32)
+        index[y, x] = np.arange(len(x))
+        return Neighbours(index, np.stack([x, y], -1).astype(np.int32), points.n, points.point)
+
+
+def variance(gap: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
+    """Variance of each sum from the difference of its two halves, (P, ...): its own or its block's, the larger one."""
+    flat = gap.reshape(len(gap), int(np.prod(gap.shape[1:])))
+    result = np.empty_like(flat)
+    _in_parts(lambda start, end: _variance(flat, near.index, start, end, result), -(-len(near.index) // BLOCK), 8)
+    return result.reshape(gap.shape)
+
+
+def smoothed(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
+    """The sums, (P, ...), with the noise of variance `noise` averaged away."""
+    flat, noise = (a.reshape(len(mean), int(np.prod(mean.shape[1:]))) for a in (mean, noise))
+    result = np.empty_like(flat)
+    geometry = (near.index, near.pixel, near.n, near.point)
+    _in_parts(lambda start, end: _smoothed(flat, noise, *geometry, start, end, result), len(mean), POINTS_PER_TASK)
+    return result.reshape(mean.shape)
+
+
+def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], count: int) -> NDArray[np.int64]:
+    """Rows of the points whose tone-mapped sums, x / (1 + x), have the largest variance, ascending. Args: (P, ...) each."""
+    if count == 0:
+        return np.zeros(0, np.int64)
+    score = np.empty(len(mean), np.float32)
+    _in_parts(lambda start, end: _score(mean, noise, start, end, score), len(mean), POINTS_PER_TASK)
+    return np.sort(np.argpartition(-score, count - 1)[:count])
+
+
+def _in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(lambda start: work(start, min(start + size, count)), range(0, count, size)))
+
+
+@fast
+def _variance(gap, index, first, end, result):  # type: ignore[no-untyped-def]
+    """`variance` of the blocks in some rows of blocks."""
+    height, width = index.shape
+    size = gap.shape[1]
+    total = np.empty(size, np.float32)
+    for top in range(first * BLOCK, min(end * BLOCK, height), BLOCK):
+        for left in range(0, width, BLOCK):
+            total[:] = 0
+            count = 0
+            for y in range(top, min(top + BLOCK, height)):
+                for x in range(left, min(left + BLOCK, width)):
+                    q = index[y, x]
+                    if q >= 0:
+                        count += 1
+                        for k in range(size):
+                            total[k] += gap[q, k] * gap[q, k]
+            if count == 0:
+                continue
+            share = np.float32(1 / count)
+            for y in range(top, min(top + BLOCK, height)):
+                for x in range(left, min(left + BLOCK, width)):
+                    q = index[y, x]
+                    if q >= 0:
+                        for k in range(size):
+                            result[q, k] = np.float32(0.25) * max(gap[q, k] * gap[q, k], total[k] * share)
+
+
+@fast
+def _score(mean, noise, start, end, result):  # type: ignore[no-untyped-def]
+    f32 = np.float32
+    for p in range(start, end):
+        total = f32(0)
+        for j in range(mean.shape[1]):
+            for c in range(mean.shape[2]):
+                slope = f32(1) / (f32(1) + max(mean[p, j, c], f32(0)))
+                slope *= slope
+                total += noise[p, j, c] * slope * slope
+        result[p] = total
+
+
+@fast
+def _smoothed(mean, noise, index, pixel, n, point, start, end, result):  # type: ignore[no-untyped-def]
+    f32 = np.float32
+    height, width = index.shape
+    size = mean.shape[1]
+    total, weight = np.empty(size, np.float32), np.empty(size, np.float32)
+    for p in range(start, end):
+        x, y = pixel[p]
+        total[:] = mean[p]
+        weight[:] = 1
+        for j in range(max(y - RADIUS, 0), min(y + RADIUS, height - 1) + 1):
+            for i in range(max(x - RADIUS, 0), min(x + RADIUS, width - 1) + 1):
+                q = index[j, i]
+                if q < 0 or q == p:
+                    continue
+                turned, out, distance = f32(0), f32(0), f32(1e-20)
+                for d in range(3):
+                    turned += (n[p, d] - n[q, d]) ** 2
+                    step = point[q, d] - point[p, d]
+                    out += step * n[p, d]
+                    distance += step * step
+                same = max(f32(0), f32(1) - turned * f32(NORMALS))
+                same *= max(f32(0), f32(1) - out * out / (distance * f32(BEND)))
+                if same <= 0:
+                    continue
+                for k in range(size):
+                    difference = mean[p, k] - mean[q, k]
+                    allowed = f32(TOLERANCE) * (noise[p, k] + min(noise[p, k], noise[q, k])) + f32(1e-20)
+                    near = max(f32(0), f32(1) - difference * difference / allowed)
+                    w = same * near * near
+                    weight[k] += w
+                    total[k] += w * mean[q, k]
+        for k in range(size):
+            result[p, k] = total[k] / weight[k]

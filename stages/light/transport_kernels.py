@@ -1,0 +1,389 @@
+"""The inner loops of the light transport: aiming and drawing a tile's rays, and summing what they saw."""
+
+import math
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.core.albedo import COSINE_STEPS, MIN_COSINE
+from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
+from stages.light.octahedral import square_to_direction
+
+CLASSES = 64
+"""Pixels of an 8 x 8 block each use a sample set of their own; together they stratify the hemisphere 64 times finer."""
+
+GOLDEN = 0.6180339887498949
+
+CELL_SHIFT = int(math.log2(FINE // CELLS))
+
+CELL_RADIUS = math.sqrt(4 / CELLS**2)
+"""Radius, in radians, of a disc as large as a cell."""
+
+fast = numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+inline = numba.njit(inline="always", error_model="numpy", cache=True)
+
+
+def interleaved_shifts() -> NDArray[np.float64]:
+    """Shift of both sample coordinates for each pixel of an 8 x 8 block, two Bayer matrices: (CLASSES, 2) in [0, 1).
+
+    Every 2 x 2, 4 x 4 and 8 x 8 group of neighbours is stratified in both. Source: Keller & Heidrich 2001,
+    "Interleaved Sampling".
+    """
+    x, y = np.arange(CLASSES) % 8, np.arange(CLASSES) // 8
+    first, second = np.zeros(CLASSES, np.int64), np.zeros(CLASSES, np.int64)
+    for bit in range(3):
+        a, b = (x >> bit) & 1, (y >> bit) & 1
+        first |= (2 * (a ^ b) + b) << (2 * (2 - bit))
+        second |= (2 * b + a) << (2 * (2 - bit))
+    return np.stack([first, second], -1) / CLASSES
+
+
+@inline
+def hashed(x, y):  # type: ignore[no-untyped-def]
+    """Uniform [0, 1) from two integers. Source: Steele et al. 2014, SplitMix64's finaliser."""
+    state = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y) * np.uint64(0xD1B54A32D192ED03)
+    state = (state ^ (state >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    state = (state ^ (state >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    state = state ^ (state >> np.uint64(31))
+    return np.float64(state >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+@fast
+def aim(n, wo, alphas, cells, first, chosen, share):  # type: ignore[no-untyped-def]
+    """How much of each cell of the excess a point would reflect if nothing stood in the way.
+
+    A light ray is drawn from a cell in proportion to its energy times the BRDF there, summed over a white diffuse and a
+    few glossy materials: product importance sampling, without visibility.
+
+    Args:
+        n, wo: (P, 3). alphas: of the glossy lobes. cells: directions (3, K) and energy (K,). first: of `Cells`.
+        chosen, share: (P, K), written: probability of each cell among its environment's, and that over its energy.
+    """
+    f32 = np.float32
+    direction, energy = cells
+    count = len(energy)
+    for p in range(len(n)):
+        ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
+        nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
+        wo_z = max(ox * nx + oy * ny + oz * nz, f32(MIN_COSINE))
+        for k in range(count):
+            wi_z = direction[0, k] * nx + direction[1, k] * ny + direction[2, k] * nz
+            share[p, k] = max(wi_z + f32(CELL_RADIUS), f32(0)) * f32(1 / math.pi)
+        for a in range(len(alphas)):
+            a2 = alphas[a] * alphas[a]
+            lambda_o = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) - wo_z * wo_z) / (wo_z * wo_z))
+            scale = f32(0.25) * a2 / (f32(math.pi) * wo_z)
+            for k in range(count):
+                wx, wy, wz = direction[0, k], direction[1, k], direction[2, k]
+                wi_z = max(wx * nx + wy * ny + wz * nz, f32(CELL_RADIUS))
+                hx, hy, hz = wx + ox, wy + oy, wz + oz
+                h2 = max(hx * hx + hy * hy + hz * hz, f32(1e-6))
+                hn = hx * nx + hy * ny + hz * nz
+                q = f32(1) + (a2 - f32(1)) * min(hn * hn / h2, f32(1))
+                masking = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) - wi_z * wi_z) / (wi_z * wi_z))
+                share[p, k] += min(max(share[p, k], f32(0)) * f32(1e9), f32(1)) * scale / (q * q * (lambda_o + masking))
+        for e in range(len(first) - 1):
+            total = f32(0)
+            for k in range(first[e], first[e + 1]):
+                total += share[p, k] * energy[k]
+            inverse = f32(1) / total if total > 0 else f32(0)
+            for k in range(first[e], first[e + 1]):
+                share[p, k] *= inverse
+                chosen[p, k] = share[p, k] * energy[k]
+
+
+@fast
+def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner, row):  # type: ignore[no-untyped-def]
+    """Draw a tile's directions above the horizon, those of neighbours along the same lobe after each other.
+
+    Args:
+        n, t, b, wo: (P, 3) world. pixel: (P, 2), its class and its number in the image.
+        samples: slots, shift, turn and seed of `Rays`. alphas: of the lobes after the cosine.
+        excess: texels and cumulative of a `LightSet`, begin and first of its cells. chosen: of `aim`.
+        directions: (P S, 3), owner: (P S,), row: (P, S), written; row is -1 for a direction under the horizon.
+    Returns:
+        Rows written.
+    """
+    f32 = np.float32
+    slots, shift, turn, seed = samples
+    points, knots = len(n), len(alphas)
+    lobes = knots + 1
+    view = np.empty((lobes, points, 3), np.float32)  # stretched by each alpha, see core.brdf.sample_vndf
+    jitter = np.empty(points, np.float32)
+    for p in range(points):
+        x = wo[p, 0] * t[p, 0] + wo[p, 1] * t[p, 1] + wo[p, 2] * t[p, 2]
+        y = wo[p, 0] * b[p, 0] + wo[p, 1] * b[p, 1] + wo[p, 2] * b[p, 2]
+        z = wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2]
+        view[0, p, 0], view[0, p, 1], view[0, p, 2] = x, y, z
+        for k in range(knots):
+            a = alphas[k]
+            s = f32(1) / math.sqrt((x * x + y * y) * a * a + z * z)
+            view[k + 1, p, 0], view[k + 1, p, 1], view[k + 1, p, 2] = x * a * s, y * a * s, z * s
+        jitter[p] = hashed(pixel[p, 1], seed) / CLASSES
+    cell, within = _choose_cells(pixel, samples, excess, chosen, lobes, jitter)
+    used = 0
+    for s in range(len(slots)):
+        lobe, i, count, place = slots[s]
+        offset0, offset1 = hashed(2 * lobe, seed), hashed(2 * lobe + 1, seed)
+        for p in range(points):
+            c = pixel[p, 0]
+            row[p, s] = -1
+            if lobe >= lobes:
+                k = cell[p, place]
+                if k < 0:
+                    continue
+                line = (shift[c, 1] + offset1 + (i + 1) * GOLDEN) % 1.0
+                d0, d1, d2 = _in_cell(k, within[p, place], line, excess)
+                if d0 * n[p, 0] + d1 * n[p, 1] + d2 * n[p, 2] <= 0:
+                    continue
+                directions[used, 0], directions[used, 1], directions[used, 2] = d0, d1, d2
+            else:
+                ox, oy, oz = view[0, p, 0], view[0, p, 1], view[0, p, 2]
+                if lobe < 0:  # the mirror direction
+                    x, y, z = -ox, -oy, oz
+                else:
+                    u = (f32(i) + (f32(shift[c, 0] + offset0) + jitter[p]) % f32(1)) / f32(count)
+                    cos, sin = turn[c, s, 0], turn[c, s, 1]
+                    if lobe == 0:
+                        radius = math.sqrt(u)
+                        x, y, z = radius * cos, radius * sin, math.sqrt(max(f32(1) - u, f32(0)))
+                    else:
+                        a = alphas[lobe - 1]
+                        vx, vy, vz = view[lobe, p, 0], view[lobe, p, 1], view[lobe, p, 2]
+                        cap = (f32(1) - u) * (f32(1) + vz) - vz
+                        radius = math.sqrt(max(f32(1) - cap * cap, f32(0)))
+                        mx, my, mz = (radius * cos + vx) * a, (radius * sin + vy) * a, cap + vz
+                        norm = f32(1) / math.sqrt(mx * mx + my * my + mz * mz)
+                        mx, my, mz = mx * norm, my * norm, mz * norm
+                        twice = f32(2) * (ox * mx + oy * my + oz * mz)
+                        x, y, z = twice * mx - ox, twice * my - oy, twice * mz - oz
+                if z <= 0:
+                    continue
+                for d in range(3):
+                    directions[used, d] = x * t[p, d] + y * b[p, d] + z * n[p, d]
+            owner[used] = p
+            row[p, s] = used
+            used += 1
+    return used
+
+
+@fast
+def _choose_cells(pixel, samples, excess, chosen, lobes, jitter):  # type: ignore[no-untyped-def]
+    """The cell of each light ray, or -1, and how far into that cell's share its sample lies: (P, light rays) each."""
+    slots, shift, _, seed = samples
+    first = excess[3]
+    points, rays = len(pixel), 0
+    for s in range(len(slots)):
+        rays += slots[s, 0] >= lobes
+    cell, within = np.full((points, rays), -1, np.int32), np.zeros((points, rays), np.float32)
+    counts, places = np.zeros(len(first) - 1, np.int64), np.zeros(len(first) - 1, np.int64)
+    for s in range(len(slots)):
+        e = slots[s, 0] - lobes
+        if e >= 0:
+            counts[e], places[e] = slots[s, 2], slots[s, 3] - slots[s, 1]
+    for e in range(len(counts)):
+        offset, last = hashed(2 * (lobes + e), seed), first[e + 1] - 1
+        for p in range(points):
+            start = (shift[pixel[p, 0], 0] + offset + jitter[p]) % 1.0
+            k, low = first[e], 0.0
+            for i in range(counts[e]):
+                u = (i + start) / counts[e]
+                while k < last and low + chosen[p, k] <= u:
+                    low += chosen[p, k]
+                    k += 1
+                if chosen[p, k] > 0:
+                    cell[p, places[e] + i] = k
+                    within[p, places[e] + i] = min(max((u - low) / chosen[p, k], 0.0), 1.0)
+    return cell, within
+
+
+@inline
+def _in_cell(k, u, line, excess):  # type: ignore[no-untyped-def]
+    """A direction in cell k: the texel by its energy and u, the place across it by what is left of u and by `line`."""
+    texels, cumulative, begin, _ = excess
+    start, end = begin[k]
+    low = 0.0 if start == 0 or cumulative[start - 1] > cumulative[start] else cumulative[start - 1]
+    target = low + u * (cumulative[end - 1] - low)
+    left, right = start, end - 1  # the first texel whose cumulative energy exceeds the target
+    while left < right:
+        middle = (left + right) // 2
+        if cumulative[middle] > target:
+            right = middle
+        else:
+            left = middle + 1
+    if left > start:
+        low = cumulative[left - 1]
+    across = min((target - low) / (cumulative[left] - low), 0.999999)
+    return square_to_direction((texels[left] % FINE + across) / FINE, (texels[left] // FINE + line) / FINE)
+
+
+@inline
+def arctan_turns(y, x):  # type: ignore[no-untyped-def]
+    """atan2(y, x) 2 / pi for x, y >= 0, to 2e-6. Source: Abramowitz & Stegun 1964, 4.4.49."""
+    f32 = np.float32
+    large, small = max(x, y), min(x, y)
+    r = small / max(large, f32(1e-30))
+    q = r * r
+    a = f32(0.0208351)
+    a = a * q - f32(0.0851330)
+    a = a * q + f32(0.1801410)
+    a = a * q - f32(0.3302995)
+    a = (a * q + f32(0.9998660)) * r * f32(2 / math.pi)
+    return f32(1) - a if y > x else a
+
+
+@fast
+def accumulate(  # type: ignore[no-untyped-def]
+    n, t, b, wo, alphas, rays, row, directions, occluded, table, seen, where, out, gap
+):
+    """Sum the rays of each point.
+
+    Args:
+        n, t, b, wo: (P, 3) world. alphas: of the knots. rays: counts and bounds of `Rays`.
+        row, directions, occluded: of `draw` and the scene. table: open-point albedo.
+        seen: pyramid, level_start, fine, block of a `LightSet`; density of `Rays`; number of `Cells`; aimed of `aim`.
+        where: each point's row of `out` and `gap`, and the place of E, then A and B of every knot but the mirror's in it.
+        out: (..., CHANNELS), written. gap: as `out`, written: the estimate from the first half of the rays less that
+        from the second.
+    """
+    f32 = np.float32
+    counts, bounds = rays
+    texels, level_start, fine, block, light_density, cells, aimed = seen
+    lights = len(cells)
+    points, slots = row.shape
+    knots = len(alphas)
+    terms, levels = 2 * knots + 1, len(level_start)
+    dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
+    s5, sin2, cos2 = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
+    tan2, density, inverse = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
+    bits = inverse.view(np.int32)
+    us, vs, level = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.int32)
+    visible = np.empty(slots, np.bool_)
+    weights = np.empty(terms * slots, np.float32)
+    smooth_light, bright_light = np.empty((slots, CHANNELS), np.float32), np.empty((slots, CHANNELS), np.float32)
+    smooth, bright = np.zeros((2, terms, CHANNELS), np.float32), np.zeros((2, terms, CHANNELS), np.float32)
+    normaliser = np.empty((2, terms), np.float32)
+    texel_angle = 4 * math.pi / (SQUARE * SQUARE)
+    for p in range(points):
+        ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
+        nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
+        tx, ty, tz = t[p, 0], t[p, 1], t[p, 2]
+        bx, by, bz = b[p, 0], b[p, 1], b[p, 2]
+        wo_z = max(ox * nx + oy * ny + oz * nz, f32(MIN_COSINE * 0.5))
+        tan2_o = (f32(1) - min(wo_z, f32(1)) ** 2) / (wo_z * wo_z)
+        for half in range(2):
+            m = lobes = 0
+            for is_light in range(2):
+                lobes = m
+                for s in range(bounds[2 * half + is_light], bounds[2 * half + is_light + 1]):
+                    r = row[p, s]
+                    if r >= 0 and not (is_light and occluded[r]):
+                        dx[m], dy[m], dz[m] = directions[r, 0], directions[r, 1], directions[r, 2]
+                        visible[m] = not occluded[r]
+                        m += 1
+            # how much of each term a ray stands for: BRDF over the density of all the rays that could have been it
+            weight = weights[: terms * m].reshape((terms, m))
+            for i in range(m):
+                wi_z = max(dx[i] * nx + dy[i] * ny + dz[i] * nz, f32(1e-7))
+                hx, hy, hz = dx[i] + ox, dy[i] + oy, dz[i] + oz
+                norm = f32(1) / math.sqrt(hx * hx + hy * hy + hz * hz)
+                hx, hy, hz = hx * norm, hy * norm, hz * norm
+                c = max(f32(1) - (hx * dx[i] + hy * dy[i] + hz * dz[i]), f32(0))
+                mx = hx * tx + hy * ty + hz * tz
+                my = hx * bx + hy * by + hz * bz
+                mz = hx * nx + hy * ny + hz * nz
+                s5[i] = c * c * c * c * c
+                sin2[i], cos2[i] = mx * mx + my * my, mz * mz
+                tan2[i] = (f32(1) - wi_z * wi_z) / (wi_z * wi_z)
+                density[i] = f32(counts[0]) * wi_z * f32(1 / math.pi)
+                weight[0, i] = f32(0.96) * (f32(1) - s5[i]) * wi_z * f32(1 / math.pi)
+            for k in range(knots):
+                a2 = alphas[k] * alphas[k]
+                lambda_o = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) - f32(1))
+                scale = f32(0.25) * a2 / (f32(math.pi) * wo_z)
+                share = f32(counts[k + 1]) / (f32(1) + lambda_o)
+                masking = f32(0.5) + lambda_o
+                for i in range(m):
+                    q = sin2[i] + a2 * cos2[i]
+                    D = scale / (q * q)
+                    f = D / (masking + f32(0.5) * math.sqrt(f32(1) + a2 * tan2[i]))
+                    density[i] += share * D
+                    weight[1 + k, i] = (f32(1) - s5[i]) * f
+                    weight[1 + knots + k, i] = s5[i] * f
+            for i in range(m):
+                inverse[i] = f32(1) / density[i]
+            for j in range(terms):
+                for i in range(m):
+                    weight[j, i] *= inverse[i]
+                total = f32(0)
+                for i in range(lobes):
+                    total += weight[j, i]
+                normaliser[half, j] = total
+            # what each ray sees
+            for i in range(m):
+                a = math.sqrt(max(f32(1) - abs(dz[i]), f32(0)))
+                v = arctan_turns(abs(dy[i]), abs(dx[i])) * a
+                u = a - v
+                if dz[i] < 0:
+                    u, v = f32(1) - v, f32(1) - u
+                us[i] = (u if dx[i] >= 0 else -u) * f32(0.5) + f32(0.5)
+                vs[i] = (v if dy[i] >= 0 else -v) * f32(0.5) + f32(0.5)
+                inverse[i] = inverse[i] * f32(0.25 / texel_angle)  # 2 x, for the nearest level
+                level[i] = min(max(((bits[i] >> 23) - 127) >> 1, 0), levels - 1)
+            smooth_light[:m] = 0
+            bright_light[:m] = 0
+            found_bright = False
+            for i in range(m):
+                if not visible[i]:
+                    continue
+                if i < lobes:
+                    size = SQUARE >> level[i]
+                    x, y = us[i] * f32(size) + f32(0.5), vs[i] * f32(size) + f32(0.5)
+                    left, top = int(x), int(y)
+                    x, y = x - f32(left), y - f32(top)
+                    above = level_start[level[i]] + top * (size + 2) + left
+                    below = above + size + 2
+                    w00, w01, w10, w11 = (f32(1) - x) * (f32(1) - y), x * (f32(1) - y), (f32(1) - x) * y, x * y
+                    for c in range(CHANNELS):
+                        smooth_light[i, c] = (
+                            w00 * texels[above, c]
+                            + w01 * texels[above + 1, c]
+                            + w10 * texels[below, c]
+                            + w11 * texels[below + 1, c]
+                        )
+                column, line = min(int(us[i] * f32(FINE)), FINE - 1), min(int(vs[i] * f32(FINE)), FINE - 1)
+                number = block[line >> 1, column >> 1]
+                if number >= 0:
+                    found_bright = True
+                    texel = 4 * number + 2 * (line & 1) + (column & 1)
+                    whole = density[i]
+                    for e in range(lights):
+                        cell = cells[e, line >> CELL_SHIFT, column >> CELL_SHIFT]
+                        if cell >= 0:
+                            whole += light_density[texel, e] * aimed[p, cell]
+                    share = density[i] / whole
+                    for c in range(CHANNELS):
+                        bright_light[i, c] = share * fine[texel, c]
+            np.dot(weight, smooth_light[:m], smooth[half])
+            if found_bright:
+                np.dot(weight, bright_light[:m], bright[half])
+            else:
+                bright[half] = 0
+        position = math.sqrt(min(wo_z, f32(1))) * f32(COSINE_STEPS - 1)
+        cell = min(int(position), COSINE_STEPS - 2)
+        x = position - f32(cell)
+        for j in range(terms):
+            albedo = table[cell, j] * (f32(1) - x) + table[cell + 1, j] * x
+            first, second = normaliser[0, j], normaliser[1, j]
+            scale = albedo / (first + second) if first + second > 0 else f32(0)
+            scale0 = albedo / first if first > 0 else f32(0)
+            scale1 = albedo / second if second > 0 else f32(0)
+            target, place = where[0][p], where[1][j]
+            for c in range(CHANNELS):
+                out[target, place, c] = (smooth[0, j, c] + smooth[1, j, c]) * scale + bright[0, j, c] + bright[1, j, c]
+                gap[target, place, c] = (
+                    smooth[0, j, c] * scale0
+                    - smooth[1, j, c] * scale1
+                    + f32(2) * (bright[0, j, c] - bright[1, j, c])
+                )

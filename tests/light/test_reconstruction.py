@@ -1,0 +1,67 @@
+"""Noise goes, edges stay, and what has no noise is left alone."""
+
+import numpy as np
+import pytest
+
+from stages.light.reconstruction import Neighbours, noisiest, smoothed, variance
+
+
+def plane(height: int = 32, width: int = 40) -> Neighbours:
+    """A flat wall that fills the image."""
+    y, x = np.mgrid[:height, :width].reshape(2, -1)
+    index = np.arange(height * width, dtype=np.int32).reshape(height, width)
+    n = np.tile(np.array([0, 0, 1], np.float32), (len(x), 1))
+    point = np.stack([x, y, 0 * x], -1).astype(np.float32)
+    return Neighbours(index, np.stack([x, y], -1).astype(np.int32), n, point)
+
+
+def noisy(truth: np.ndarray, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+    """The mean of two halves, each of deviation sigma sqrt(2), and their difference."""
+    halves = truth + sigma * 2**0.5 * np.random.default_rng(0).normal(size=(2, *truth.shape))
+    return halves.mean(0).astype(np.float32), (halves[0] - halves[1]).astype(np.float32)
+
+
+def test_variance_is_that_of_the_mean() -> None:
+    near = plane()
+    _, gap = noisy(np.ones((len(near.n), 2)), 0.1)
+    found = variance(gap[:, :1], near)
+    assert float(np.median(found)) == pytest.approx(0.01, rel=0.3)
+
+
+def test_noise_on_a_wall_falls_threefold() -> None:
+    near = plane()
+    truth = np.full((len(near.n), 3), 2.0)
+    mean, gap = noisy(truth, 0.1)
+    before, after = (np.sqrt(np.square(a - truth).mean()) for a in (mean, smoothed(mean, variance(gap, near), near)))
+    assert after < 0.33 * before
+
+
+def test_an_edge_beyond_the_noise_stays() -> None:
+    near = plane()
+    truth = np.where(near.pixel[:, :1] < 20, 1.0, 3.0)
+    mean, gap = noisy(truth, 0.05)
+    result = smoothed(mean, variance(gap, near), near)
+    assert np.abs(result - truth).max() < 0.2
+
+
+def test_what_has_no_noise_is_left_alone() -> None:
+    near = plane()
+    mean = np.random.default_rng(1).random((len(near.n), 4)).astype(np.float32)
+    assert smoothed(mean, np.zeros_like(mean), near) == pytest.approx(mean, abs=1e-6)
+
+
+def test_another_surface_is_not_mixed_in() -> None:
+    near = plane()
+    right = near.pixel[:, 0] >= 20
+    near.point[right, 2] = 0.5 * 40  # behind a silhouette
+    truth = np.where(right, 1.0, 1.02)[:, None]
+    mean, _ = noisy(truth, 0.0)
+    result = smoothed(mean, np.full_like(mean, 0.01), near)
+    assert result == pytest.approx(truth, abs=1e-5)
+
+
+def test_noisiest_is_judged_as_seen() -> None:
+    mean = np.array([1.0, 100.0, 1.0, 1.0], np.float32).reshape(4, 1, 1)
+    noise = np.array([0.1, 5.0, 0.3, 0.2], np.float32).reshape(4, 1, 1)
+    assert noisiest(mean, noise, 2).tolist() == [2, 3]  # a bright point's noise is not seen
+    assert noisiest(mean, noise, 0).tolist() == []
