@@ -2,6 +2,7 @@
 
 import dataclasses
 import shutil
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,12 +91,18 @@ def conditions(
             progress("choosing rays", 0, 1)
             first = trace_view(scene, cameras.c2w[0], float(cameras.fov_y[0]), options.size, options.size)
             quality, expected = choose_quality(scene, first, lights, options.error, options.seed)
-        made = 0
-        for view in range(options.views):
-            progress("views", view, options.views)
-            if not view_is_there(out, view, names, options.maps):
-                trace_and_write(out, view, scene, cameras, lights, quality, options)
-                made += 1
+        missing = [view for view in range(options.views) if not view_is_there(out, view, names, options.maps)]
+        made = len(missing)
+        with ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
+            written = None
+            for i, view in enumerate(missing):
+                progress("views", options.views - made + i, options.views)
+                traced = trace(view, scene, cameras, lights, quality, options)
+                if written:
+                    written.result()
+                written = writer.submit(write, out, view, lights, traced, options)
+            if written:
+                written.result()
         progress("views", options.views, options.views)
         write_sheet(out, sheet(out, names, options.views))
         log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(quality), "expected_percent": expected}
@@ -175,24 +182,35 @@ def expected_files(names: tuple[str, ...], options: ConditionsOptions) -> list[s
     return ["cameras.npz", "sheet.png", *(f"environments/{name}.exr" for name in names), *views]
 
 
-def trace_and_write(
-    out: Path,
+def trace(
     view: int,
     scene: Scene,
     cameras: Cameras,
     lights: list[Environment],
     quality: Quality,
     options: ConditionsOptions,
-) -> None:
-    """One view: geometry, then its transport under every environment."""
+) -> tuple[Geometry, list[Transport]]:
+    """One view: its geometry, and its transport under every environment. Raises: NumericalError."""
     c2w = cameras.c2w[view]
     points = trace_view(scene, c2w, float(cameras.fov_y[view]), options.size, options.size)
-    geometry = Geometry(points.mask, points.depth, view_normals(points, c2w))
     seed = options.seed * 1_000_003 + view
     transports = light_transport(scene, points, lights, quality, seed)
-    write_geometry(out, view, geometry)
     for light, transport in zip(lights, transports, strict=True):
         check_finite(transport, light.name, view, options.seed)
+    return Geometry(points.mask, points.depth, view_normals(points, c2w)), transports
+
+
+def write(
+    out: Path,
+    view: int,
+    lights: list[Environment],
+    traced: tuple[Geometry, list[Transport]],
+    options: ConditionsOptions,
+) -> None:
+    """The files of one view."""
+    geometry, transports = traced
+    write_geometry(out, view, geometry)
+    for light, transport in zip(lights, transports, strict=True):
         write_transport(out, view, light.name, geometry.mask, transport)
         if options.maps:
             write_maps(out, view, light.name, geometry, transport)

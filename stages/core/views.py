@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from stages.core.artifact import ExrImage, read_exr, write_exr
 from stages.core.errors import ArtifactError
@@ -21,6 +22,10 @@ from stages.core.shading import KNOTS, Transport
 
 LARGEST_STORED = 32768.0
 """Stored radiance stays at or under this, well inside half float's range."""
+
+
+DROPPED = 3
+"""Bits of a half float's significand that are not stored: what is left errs by 0.2 % and packs a third smaller."""
 
 
 @dataclass(frozen=True)
@@ -71,16 +76,25 @@ def transport_channels() -> list[str]:
 
 def write_transport(folder: Path, view: int, environment: str, mask: NDArray[np.bool_], transport: Transport) -> None:
     """Write view_NNN/<environment>.exr; `transport` holds the mask's pixels row by row."""
-    values = transport.packed().numpy()
-    scale = 2.0 ** max(0, int(np.ceil(np.log2(max(float(values.max(initial=0.0)), 1.0) / LARGEST_STORED))))
+    values = transport.packed()
+    largest = float(values.max()) if len(values) else 0.0
+    scale = 2.0 ** max(0, int(np.ceil(np.log2(max(largest, 1.0) / LARGEST_STORED))))
     values[:, :-1] /= scale
     window = object_window(mask)
     inside = mask[window]
     image = np.zeros((values.shape[1], *inside.shape), np.float16)
-    image[:, inside] = values.astype(np.float16).T
+    image[:, inside] = rounded(values).T.contiguous().numpy()
     channels = dict(zip(transport_channels(), image, strict=True))
     path = folder / view_folder(view) / f"{environment}.exr"
     _write(path, channels, mask.shape, window, {"dreammat_scale": repr(scale)})
+
+
+def rounded(values: Tensor) -> Tensor:
+    """As half floats with DROPPED bits of the significand rounded away, but for the last column, N·V. Args: (P, WIDTH)."""
+    half = values.half()
+    bits = half[:, :-1].view(torch.int16)
+    bits.add_(1 << (DROPPED - 1)).bitwise_and_(-1 << DROPPED)
+    return half
 
 
 def read_transport(folder: Path, view: int, environment: str, mask: NDArray[np.bool_]) -> Transport:

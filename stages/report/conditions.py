@@ -56,7 +56,8 @@ SAMPLE = 3000
 CONVERGED = Quality(6144, 3072, extra=False, smooth=False)
 SEEDS = (7_001, 7_002)
 
-QUADRATURE_PIXELS, SUBDIVISION = 12, 3
+QUADRATURE_PIXELS, QUADRATURE_ROWS = 8, 1024
+"""Pixels and rows of directions of the float64 quadrature."""
 
 
 @dataclass(frozen=True)
@@ -222,7 +223,8 @@ def quadrature(subject: Subject) -> list[Row]:
     kept = [k for k, (_, r) in enumerate(LIGHT_MAPS) if r > 0]
     rows = []
     for e, light in enumerate(subject.lights.environments):
-        exact = reference_transport(subject.scene, subject.points, light, SUBDIVISION, subject.pixels[some])
+        cells = -(-QUADRATURE_ROWS // len(light.radiance))
+        exact = reference_transport(subject.scene, subject.points, light, cells, subject.pixels[some])
         error = (subject.truth[e][some] - reinhard(light_maps(exact)))[:, kept].abs()
         percent, largest = rms(error) * 100, float(error.max()) * 100
         rows.append(Row("converged, against quadrature", 0, 0, light.name, "rough", 0.0, percent, largest, subject.floor[e]))

@@ -78,8 +78,8 @@ def measure(python: str, job: Job, mask: np.ndarray) -> list[Render]:
                 tone = {samples: x / (1 + x) for samples, x in tone.items()}
                 seconds = dict(zip(SAMPLES, result["seconds"].tolist(), strict=True))
             for samples in SAMPLES:
-                error = np.abs(tone[samples] - tone[CONVERGED])
-                rmse, p999 = float(np.sqrt(np.square(error).mean())), float(np.quantile(error, 0.999))
+                off = np.abs(tone[samples] - tone[CONVERGED])
+                rmse, p999 = float(np.sqrt(np.square(off).mean())), float(np.quantile(off, 0.999))
                 everything = seconds[samples] * MAPS * len(job.environments)
                 row = (samples, seconds[samples], everything, rmse * 100, p999 * 100)
                 renders.append(Render(environment.name, *row))

@@ -30,11 +30,13 @@ CHUNK = 2048
 TIMED = 16_384
 """Pixels by which Monte Carlo is timed; seconds are scaled to the view."""
 
-PIXELS, SUBDIVISION = 48, 2
+PIXELS = 24
+ROWS = 512
+"""Rows of directions of the quadrature, at least."""
 
 REPEATS = 5
 
-LOWEST_ROUGHNESS = 0.2
+LOWEST_ROUGHNESS = 0.3
 """Of the random materials: lobes that the quadrature's grid resolves."""
 
 
@@ -110,11 +112,12 @@ def error(found: Tensor, exact: Tensor) -> float:
 
 
 def exact_gradient(scene: Scene, points: GBuffer, radiance: NDArray, materials: Tensor, rows: NDArray) -> Tensor:
-    """(N, 5) float64: quadrature over every texel of the light, cut SUBDIVISION times, differentiated as a whole."""
+    """(N, 5) float64: quadrature over every texel of the light, cut if they are few, differentiated as a whole."""
     height, width, _ = radiance.shape
-    directions, angle = directions_of_texels(height * SUBDIVISION, width * SUBDIVISION)
+    cells = -(-ROWS // height)
+    directions, angle = directions_of_texels(height * cells, width * cells)
     wi = directions.reshape(-1, 3)
-    light = lookup(radiance, wi) * np.repeat(angle, width * SUBDIVISION)[:, None]
+    light = lookup(radiance, wi) * np.repeat(angle, width * cells)[:, None]
     gradients = []
     for row, values in zip(rows, materials.double(), strict=True):
         n, wo = points.n[row].astype(np.float64), points.wo[row].astype(np.float64)

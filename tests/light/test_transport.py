@@ -7,7 +7,7 @@ import torch
 from stages.core.brdf import alpha_from_roughness, directional_albedo
 from stages.core.color import reinhard
 from stages.core.shading import F0, KNOTS, Transport
-from stages.light.environment import Environment, directions_of_texels
+from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.reference import reference_transport
 from stages.light.scene import Scene
@@ -103,63 +103,3 @@ def test_environments_do_not_influence_each_other_in_the_mean() -> None:
     apart = [light_transport(scene, points, [light], QUALITY["high"], 1)[0] for light in lights]
     alone = [reinhard(stacked(t)).mean() for t in apart]
     assert [float(t) for t in together] == pytest.approx([float(a) for a in alone], rel=5e-3)
-
-
-def test_single_texel_light_does_not_sparkle() -> None:
-    """All light in one texel: the rough terms keep within twice the reference's largest value."""
-    scene, light = scenes.sphere(4), scenes.single_texel_light()
-    points = scenes.view_of(scene, 32)
-    t = light_transport(scene, points, [light], QUALITY["standard"], 0)[0]
-    pixels = np.arange(0, len(points.n), 9)
-    reference = reference_transport(scene, points, light, 8, pixels)
-    for fast, exact in ((t.E, reference.E), (t.A[:, -1], reference.A[:, -1]), (t.A[:, 5], reference.A[:, 5])):
-        assert float(fast.max()) < 2 * float(exact.max())
-    assert rmse_percent(scene, points, light, QUALITY["standard"], 8) < 1.0
-
-
-@pytest.mark.parametrize("roughness", range(len(KNOTS)))
-def test_finite_at_grazing_view(roughness: int) -> None:
-    t = light_transport(
-        scenes.sphere(1, 0.01), scenes.open_point(1e-3, 8), [scenes.sunny_light(65000.0)], QUALITY["draft"], 0
-    )[0]
-    assert bool(t.A[:, roughness].isfinite().all())
-    assert bool(t.B[:, roughness].isfinite().all())
-
-
-def test_view_without_the_object() -> None:
-    scene = scenes.sphere(2)
-    points = scenes.view_of(scene, 16, eye=(400.0, 300.0, 200.0))
-    empty = GBuffer(points.mask & False, points.depth * 0, *(getattr(points, f)[:0] for f in POINT_FIELDS))
-    assert len(light_transport(scene, empty, [scenes.even_light()], QUALITY["draft"], 0)[0].E) == 0
-
-
-POINT_FIELDS = ("point", "origin", "n", "ng", "wo", "triangle", "barycentric")
-
-
-def test_coarse_smooth_sphere_has_no_black_facets() -> None:
-    """Twenty triangles with smooth normals: where the shading normal faces the sun, light arrives."""
-    scene, light = scenes.sphere(0), scenes.single_texel_light()
-    points = scenes.view_of(scene, 48)
-    rows, columns = np.nonzero(light.radiance[..., 0])
-    direction = directions_of_texels(*light.radiance.shape[:2])[0][rows[0], columns[0]]
-    lit = points.n @ direction > 0.25
-    t = light_transport(scene, points, [light], QUALITY["standard"], 0)[0]
-    assert float((t.E[torch.from_numpy(lit)].amax(1) <= 0).float().mean()) < 0.01
-
-
-def test_duplicate_faces_do_not_shadow_themselves() -> None:
-    base = scenes.sphere(3)
-    scene = Scene(base.vertices, np.concatenate([base.triangles] * 2), np.concatenate([base.normals] * 2))
-    points = scenes.view_of(scene, 24)
-    once, twice = (light_transport(s, points, [scenes.even_light()], QUALITY["draft"], 0)[0].E for s in (base, scene))
-    assert torch.equal(once, twice)
-
-
-def test_closed_box_lets_no_light_in() -> None:
-    import trimesh
-
-    mesh = trimesh.creation.box()
-    scene = Scene(mesh.vertices, mesh.faces, scenes.flat_normals(mesh.vertices, mesh.faces))
-    points = scenes.view_of(scene, 32, eye=(0.3, 0.2, 0.1))
-    t = light_transport(scene, points, [scenes.even_light()], QUALITY["draft"], 0)[0]
-    assert float(stacked(t).max()) == 0.0
