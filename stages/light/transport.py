@@ -44,7 +44,7 @@ from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
 from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts
 
-TILE = 256
+TILE = 512
 """Points a thread takes at once: their rays stay in its cache."""
 
 STORED = 2 * len(KNOTS) + 1
@@ -66,7 +66,7 @@ SUMMED = np.array([j for j in range(STORED) if j not in MIRROR])
 class Quality:
     """How many rays a point traces: `lobe` for the mixture of lobes, `light` for the excess of an average environment.
 
-    The noisiest points trace more, see EXTRA, and what noise is left is smoothed, unless switched off.
+    The noisiest points trace more, see EXTRA_RAYS, and what noise is left is smoothed, unless switched off.
     """
 
     lobe: int
@@ -79,11 +79,11 @@ class Quality:
         return replace(self, lobe=max(2, round(self.lobe * factor)), light=max(2, round(self.light * factor)))
 
 
-EXTRA = ((0.2, 3),)
-"""Share of the points that trace more, and how many times the rays of the others, turn after turn."""
+EXTRA_SHARE, EXTRA_RAYS = 0.2, 3.0
+"""Share of the points that trace more, and how many times the rays of the others."""
 
 SEED_STEP = 0x5EED
-"""Between the seeds of turns."""
+"""Between the seed of a point's rays and that of its further ones."""
 
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
@@ -136,12 +136,9 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
     """`light_transport` for lights that are already split."""
     sums = trace(scene, points, lights, quality, seed)
-    spent = np.full(len(points.n), float(quality.lobe))
-    for i, (share, factor) in enumerate(EXTRA if quality.extra else ()):
-        worst = reconstruction.noisiest(sums.mean[:, JUDGED], sums.variance[:, JUDGED], int(share * len(points.n)))
-        more = quality.scaled(factor)
-        add(sums, worst, trace(scene, points[worst], lights, more, seed + (i + 1) * SEED_STEP), more.lobe / spent[worst])
-        spent[worst] += more.lobe
+    if quality.extra:
+        worst = reconstruction.noisiest(sums.mean[:, JUDGED], sums.variance[:, JUDGED], int(EXTRA_SHARE * len(points.n)))
+        add(sums, worst, trace(scene, points[worst], lights, quality.scaled(EXTRA_RAYS), seed + SEED_STEP), EXTRA_RAYS)
     mean = sums.mean
     if quality.smooth:
         sums.variance[:, SHARP] = 0
@@ -155,11 +152,11 @@ def _transport(sums: NDArray, cosine: torch.Tensor) -> Transport:
     return Transport(E[:, 0], A, B, cosine)
 
 
-def add(sums: Sums, rows: NDArray[np.int64], more: Sums, ratio: NDArray[np.float64]) -> None:
-    """Average further rays into some points, in place; `more` stands for `ratio` times the rays of `sums`."""
-    b = (ratio / (1 + ratio)).astype(np.float32)[:, None, None]
-    sums.mean[rows] += b * (more.mean - sums.mean[rows])
-    sums.variance[rows] = (1 - b) ** 2 * sums.variance[rows] + b**2 * more.variance
+def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
+    """Average further rays into some points, in place; `more` stands for `factor` times the rays of `sums`."""
+    old, new = 1 / (1 + factor), factor / (1 + factor)
+    sums.mean[rows] = old * sums.mean[rows] + new * more.mean
+    sums.variance[rows] = old**2 * sums.variance[rows] + new**2 * more.variance
 
 
 def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> Sums:

@@ -9,7 +9,6 @@ each setting, environment and map; steps.csv; conditions.png; and mitsuba.csv wh
 import csv
 import dataclasses
 import io
-import subprocess
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -29,6 +28,7 @@ from stages.core.color import reinhard
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
 from stages.core.shading import KNOTS, LIGHT_MAPS, Transport, interpolate, light_maps
+from stages.core.views import rounded
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.light_set import LightSet
@@ -41,13 +41,13 @@ from stages.report.options import ReportOptions
 COVERAGE = 0.42
 """Share of the view's pixels that the object fills."""
 
-SWEEP = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 32.0)
+SWEEP = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, 32.0, 128.0)
 """Rays, as a multiple of the standard quality's."""
 
 WINDOWED = 8.0
 """From this multiple on, only a window of the view is traced and its seconds are scaled to the view."""
 
-WINDOW = 0.08
+WINDOW = 0.05
 """Share of the object's pixels in that window."""
 
 SAMPLE = 3000
@@ -183,8 +183,8 @@ def ablations(subject: Subject, seed: int, step: Callable[[int], None]) -> list[
         maps = [light_maps(t[torch.from_numpy(subject.pixels)]) for t in found]
         rows += compare(subject, name, quality, maps, time.perf_counter() - start, slice(None))
         step(1 + len(rows) // (6 * len(subject.truth)))
-    halves = [Transport(t.E.half().float(), t.A.half().float(), t.B.half().float(), t.cosine) for t in subject.converged]
-    rows += compare(subject, "stored as half floats", Quality(0, 0), [light_maps(t) for t in halves], 0.0, slice(None))
+    stored = [light_maps(Transport.unpack(rounded(t.packed()).float())) for t in subject.converged]
+    rows += compare(subject, "as stored", Quality(0, 0), stored, 0.0, slice(None))
     return rows + knots_left_out(subject) + quadrature(subject)
 
 
@@ -257,9 +257,3 @@ def write_csv(path: Path, rows: Iterable[Any]) -> None:
     writer.writeheader()
     writer.writerows({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in dataclasses.asdict(row).items()} for row in rows)
     write_text(path, stream.getvalue())
-
-
-def commit() -> str:
-    """The commit of the working tree, or "unknown" outside of one."""
-    found = subprocess.run(["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, cwd=Path(__file__).parent)
-    return found.stdout.strip() or "unknown"

@@ -17,7 +17,7 @@ import numpy as np
 SAMPLES = (16, 64, 256)
 """Samples a pixel that are timed."""
 
-CONVERGED = 4096
+CONVERGED = 1024
 
 BATCH = 256
 """Samples a pixel of one pass, which bounds memory."""

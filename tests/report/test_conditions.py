@@ -30,7 +30,7 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
     assert worst("8 x standard") < worst("standard") < worst("0.5 x standard")
     assert worst("standard") < worst("no smoothing")
-    assert worst("stored as half floats") < 0.05
+    assert worst("as stored") < 0.1
     assert worst("converged, against quadrature") < 0.5
     mirrors = [row.rmse_percent for row in rows if row.map == "m1_r0" and row.setting == "standard"]
     assert max(mirrors) < 1e-3  # looked up, not sampled

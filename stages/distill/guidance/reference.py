@@ -41,7 +41,7 @@ MAX_MISSED = 0.05
 CHUNK = 16384
 """Pixels whose target is shaded at once."""
 
-HUBER = 0.03
+HUBER = 0.1
 """Residual, in nepers of radiance, beyond which the loss grows linearly."""
 
 FLOOR = 0.001
