@@ -8,10 +8,10 @@ from stages.core.shading import F0, Material
 REACH = 0.05
 """Standard deviation of the smoothness loss's displacement, world units. Source: Zhang et al. 2024, DreamMat, Section 3.3."""
 
-PULL = 0.0005
+PULL = 0.002
 TWIN_PULL = 0.1
-TWIN_NEAR, TWIN_FAR = 0.05, 0.12
-"""Weights of `plainness` and the window of its stronger pull. A residual of reference.HUBER weighs 0.1."""
+TWIN_NEAR, TWIN_FAR = 0.15, 0.35
+"""Weights of `plainness` and the window of its stronger pull. A residual of reference.HUBER weighs 0.03."""
 
 
 def displaced(points: Tensor, normals: Tensor, generator: torch.Generator) -> Tensor:

@@ -30,7 +30,7 @@ from stages.light.scene import Scene
 PIXELS = 1024
 """Pixels a step for each image of the batch: many small steps get further in a given time than few large ones."""
 
-BUDGET = Budget(steps=6000, learning_rate=0.02)
+BUDGET = Budget(steps=8000, learning_rate=0.02)
 
 REACH = 5e-3
 """The reference's surface is looked for this far before and behind a seen point, world units."""
@@ -41,7 +41,7 @@ MAX_MISSED = 0.05
 CHUNK = 16384
 """Pixels whose target is shaded at once."""
 
-HUBER = 0.1
+HUBER = 0.03
 """Residual, in nepers of radiance, beyond which the loss grows linearly."""
 
 FLOOR = 0.001
