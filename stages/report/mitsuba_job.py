@@ -1,6 +1,6 @@
 """The same view in Mitsuba 3, for comparison: speed and error of one light map, against its own converged result.
 
-Mitsuba has an environment of its own. This file is run there as a script, which reads job.npz and writes result.npz.
+Mitsuba has an environment of its own. This file is run there as a script, which reads and writes folders of .npy files.
 Its material is the `principled` one, white, roughness 0.5: the integral is the same kind, not the same to the last digit,
 which is why each renderer is compared with itself.
 """
@@ -57,15 +57,15 @@ def measure(python: str, job: Job, mask: np.ndarray) -> list[Render]:
 
     Raises: InputError when the interpreter or its mitsuba fails.
     """
-    from stages.core.errors import InputError  # not to be had where this file runs as a script
+    from stages.core.color import reinhard  # not to be had where this file runs as a script
+    from stages.core.errors import InputError
 
     renders = []
     with tempfile.TemporaryDirectory() as folder:
         for environment in job.environments:
-            given, made = Path(folder) / "job.npz", Path(folder) / "result.npz"
+            given, made = Path(folder) / f"{environment.name}_job", Path(folder) / f"{environment.name}_result"
             mesh = {name: getattr(job.scene, name) for name in ("vertices", "triangles", "normals")}
-            camera = {"c2w": job.c2w, "fov_y": job.fov_y, "size": job.size}
-            np.savez(given, radiance=environment.radiance, **mesh, **camera)  # type: ignore[arg-type]
+            write_arrays(given, mesh | {"c2w": job.c2w, "fov_y": job.fov_y, "size": job.size, "radiance": environment.radiance})
             try:
                 subprocess.run([python, __file__, str(given), str(made)], check=True, capture_output=True)
             except (OSError, subprocess.CalledProcessError) as error:
@@ -73,10 +73,9 @@ def measure(python: str, job: Job, mask: np.ndarray) -> list[Render]:
                     f"{python}: {error}; expected a Python with the package mitsuba and LLVM 15 or newer "
                     "(DRJIT_LIBLLVM_PATH names its library)"
                 ) from error
-            with np.load(made) as result:
-                tone = {int(name): result[name][mask] for name in result.files if name.isdigit()}
-                tone = {samples: x / (1 + x) for samples, x in tone.items()}
-                seconds = dict(zip(SAMPLES, result["seconds"].tolist(), strict=True))
+            result = read_arrays(made)
+            tone = {samples: reinhard(result[str(samples)][mask]) for samples in (*SAMPLES, CONVERGED)}
+            seconds = dict(zip(SAMPLES, result["seconds"].tolist(), strict=True))
             for samples in SAMPLES:
                 off = np.abs(tone[samples] - tone[CONVERGED])
                 rmse, p999 = float(np.sqrt(np.square(off).mean())), float(np.quantile(off, 0.999))
@@ -86,12 +85,24 @@ def measure(python: str, job: Job, mask: np.ndarray) -> list[Render]:
     return renders
 
 
+def write_arrays(folder: Path, arrays: dict) -> None:
+    """Each array as <name>.npy."""
+    folder.mkdir()
+    for name, array in arrays.items():
+        np.save(folder / f"{name}.npy", array, allow_pickle=False)
+
+
+def read_arrays(folder: Path) -> dict[str, np.ndarray]:
+    """What `write_arrays` wrote."""
+    return {path.stem: np.load(path, allow_pickle=False) for path in folder.glob("*.npy")}
+
+
 def render(given: str, made: str) -> None:
     """What runs inside of Mitsuba's environment."""
     import mitsuba as mi  # type: ignore[import-not-found]
 
     mi.set_variant("llvm_ad_rgb")
-    job = np.load(given)
+    job = read_arrays(Path(given))
     scene = mi.load_dict(
         {
             "type": "scene",
@@ -124,7 +135,7 @@ def render(given: str, made: str) -> None:
         images[str(samples)] = np.array(mi.render(scene, spp=samples, seed=samples))
         seconds.append(time.perf_counter() - start)
     batches = [np.array(mi.render(scene, spp=BATCH, seed=10_000 + i)) for i in range(CONVERGED // BATCH)]
-    np.savez(made, seconds=seconds, **{str(CONVERGED): np.mean(batches, 0)}, **images)  # type: ignore[arg-type]
+    write_arrays(Path(made), images | {"seconds": np.array(seconds), str(CONVERGED): np.mean(batches, 0)})
 
 
 def mesh_of(mi, job):  # type: ignore[no-untyped-def]
