@@ -70,8 +70,10 @@ FORCE:
 
 # ------------------------------------------------------------------------------------------ what people type
 
-demo: $(VENV)/.ready  ## texture a mesh made by the project itself, from nothing to demo/asset
-	$(RUN)/python examples/urn.py demo/urn.obj
+demo/urn.obj: examples/urn.py | $(VENV)/.ready
+	$(RUN)/python $< $@
+
+demo: demo/urn.obj  ## texture a mesh made by the project itself, from nothing to demo/asset
 	@printf 'weathered copper' > demo/prompt.txt
 	$(MAKE) demo/asset/bake.json CONDITIONS_OPTIONS='--views 32' DISTILL_OPTIONS='--steps 400'
 	@echo "look at demo/asset/preview.png; the model is demo/asset/model.glb"
@@ -93,7 +95,8 @@ lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 
-bench: demo/prep.npz | $(MITSUBA)  ## speed against error of the light transport, beside Mitsuba 3 where pip has it
+bench: demo/urn.obj | $(MITSUBA)  ## speed against error of the light transport, beside Mitsuba 3 where pip has it
+	$(MAKE) demo/prep.npz
 	$(DREAMMAT) report conditions demo/prep.npz -o bench $$([ -s $(MITSUBA) ] && echo --mitsuba $$(cat $(MITSUBA)))
 	@echo "look at bench/conditions.png"
 
