@@ -51,7 +51,7 @@ class LightSet:
     number, or -1 where there is no excess.
     density: (4 N, MAX_LIGHTS) float32, density (1/sr) of directions drawn by the energy of each environment's excess.
     texels, cumulative: of all environments after each other, the excess texels along a Morton curve, on which every
-    cell is one stretch, and their cumulative share of their environment's energy.
+    cell is one stretch, and the running sum of their shares of their environment's energy.
     cells: the squares of FINE / CELLS texels that hold excess.
     demand: (environments,) how light rays are best shared out: the noise that one ray in each would leave, tone-mapped.
     """
@@ -121,7 +121,7 @@ def _cells(energy: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float64], Cel
     side = FINE // CELLS
     x, y, z = texel_directions(FINE)
     texels: list[NDArray] = []
-    cumulative: list[NDArray] = []
+    energies: list[NDArray] = []
     direction: list[list[NDArray]] = []
     share: list[NDArray] = []
     begin: list[NDArray] = []
@@ -140,7 +140,7 @@ def _cells(energy: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float64], Cel
             number[e].reshape(-1)[cell[start]] = np.arange(len(start)) + first[-1]
         first.append(first[-1] + len(start))
         texels.append(index)
-        cumulative.append(np.cumsum(own[index]))
+        energies.append(own[index])
     mean = np.concatenate([np.zeros((3, 0)), *direction], 1)
     cells = Cells(
         (mean / np.linalg.norm(mean, axis=0)).astype(np.float32),
@@ -149,7 +149,7 @@ def _cells(energy: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float64], Cel
         np.array(first),
         number,
     )
-    return np.concatenate(texels).astype(np.int32), np.concatenate(cumulative), cells
+    return np.concatenate(texels).astype(np.int32), np.cumsum(np.concatenate(energies)), cells
 
 
 def _blocks(peaks: NDArray) -> tuple[NDArray[np.float32], NDArray[np.int32]]:

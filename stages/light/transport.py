@@ -10,14 +10,15 @@ every term, every roughness and every environment:
 - a ray along the mirror direction gives roughness 0 exactly;
 - rays drawn from the cosine lobe and from the visible-normal lobe of each roughness are weighted by the density of the
   whole mixture (multiple importance sampling, balance heuristic). Each looks up the bounded part of the light in a
-  prefiltered pyramid, at the solid angle the ray stands for. The sum is divided by the sum of its own weights and
+  prefiltered pyramid, at an eighth of the solid angle the ray stands for. The sum is divided by the sum of its own weights and
   multiplied by the exact unoccluded albedo, so an evenly lit open point has no error at all;
 - what rises above the bound (a sun, a lamp) has rays of its own, aimed at what the point would reflect most of, and
   combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles;
 - neighbouring pixels use complementary samples; the points that turn out noisiest trace more; and what noise is left is
   averaged over neighbours that do not differ by more than it (`stages.light.reconstruction`).
 
-Every source of error falls as rays are added; none stays. The result depends on seed and pixel only, not on threads.
+These errors fall as rays are added. What stays is the resolution of the lights, 0.4 degrees (`stages.light.light_set`), under
+what roughness 0.08 spreads; a mirror looks up the light itself. The result depends on seed and pixel only, not on threads.
 `stages.light.reference` is the obvious form.
 
 Source: Veach 1997, ch. 9 (MIS); Křivánek & Colbert 2008, "Real-time Shading with Filtered Importance Sampling"; Keller &

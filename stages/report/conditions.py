@@ -27,7 +27,7 @@ from stages.core.artifact import Artifact, load_npz, write_text
 from stages.core.color import reinhard
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
-from stages.core.shading import KNOTS, LIGHT_MAPS, Transport, interpolate, light_maps
+from stages.core.shading import F0, KNOTS, LIGHT_MAPS, Transport, interpolate, light_maps
 from stages.core.views import rounded
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer, trace_view
@@ -194,7 +194,7 @@ def knots_left_out(subject: Subject) -> list[Row]:
     for e, (light, t) in enumerate(zip(subject.lights.environments, subject.converged, strict=True)):
         for k in range(1, len(KNOTS), 2):
             A, B = interpolate(t, torch.full_like(t.cosine, KNOTS[k]), range(0, len(KNOTS), 2))
-            pairs = ((t.E + 0.04 * A + B, t.E + 0.04 * t.A[:, k] + t.B[:, k]), (A + B, t.A[:, k] + t.B[:, k]))
+            pairs = ((t.E + F0 * A + B, t.E + F0 * t.A[:, k] + t.B[:, k]), (A + B, t.A[:, k] + t.B[:, k]))
             for m, (found, exact) in enumerate(pairs):
                 error = (reinhard(found) - reinhard(exact)).abs()
                 name, p999 = f"m{m}_r{KNOTS[k]:g}", float(np.quantile(error.numpy(), 0.999)) * 100

@@ -9,6 +9,7 @@ from stages.light.environment import Environment, directions_of_texels
 from stages.light.light_set import CELLS, FINE, LightSet, light_set, split
 from stages.light.octahedral import direction_to_square, octahedral, square_to_direction
 from stages.light.transport import share_out
+from stages.light.transport_kernels import _in_cell
 
 
 def gradient(height: int) -> np.ndarray:
@@ -103,3 +104,23 @@ def test_light_rays_go_where_they_are_needed() -> None:
     assert rays[2] == 0  # there is no excess to aim at
     assert 2 <= rays[0] < rays[1]
     assert (rays % 2 == 0).all()
+
+
+def test_a_lamp_of_one_texel_is_hit_in_every_environment() -> None:
+    """Cumulative energies run on over environments, so that the second one's only texel has a width of its own."""
+    energy = np.zeros((FINE, FINE, 2))
+    places = [(100, 40), (300, 411)]
+    for e, (row, column) in enumerate(places):
+        energy[row, column, e] = 1.0
+    texels, cumulative, cells = module._cells(energy)
+    for k, (row, column) in enumerate(places):
+        for u in (0.0, 0.4, 1.0):
+            found = _in_cell(k, u, 0.5, (texels, cumulative, cells.begin, cells.first))
+            u_found, v_found = direction_to_square(*found)
+            assert (int(v_found * FINE), int(u_found * FINE)) == (row, column)
+
+
+def test_a_cell_of_no_width_gives_a_direction() -> None:
+    """Energy that is lost in the rounding of the sum must not make a ray that is not a number."""
+    excess = (np.array([7, 9], np.int32), np.array([1.0, 1.0]), np.array([[0, 1], [1, 2]]), np.array([0, 2]))
+    assert np.isfinite(_in_cell(1, 0.3, 0.5, excess)).all()
