@@ -98,6 +98,32 @@ def shade_reference(transport: Transport, material: Material) -> Tensor:
     return (1 - m) * c * transport.E + (F0 * (1 - m) + m * c) * A + B
 
 
+@dataclass(frozen=True)
+class Derivatives:
+    """Of the radiance (P L, 3), channel by channel: by the albedo of that channel, by roughness and by metallic."""
+
+    albedo: Tensor
+    roughness: Tensor
+    metallic: Tensor
+
+
+def derivatives(transport: Transport, material: Material) -> Derivatives:
+    """Derivatives of `shade` by the material; arguments as there. Not differentiable."""
+    c, r, m = (t.detach() for t in (material.albedo, material.roughness, material.metallic))
+    lights = len(transport.E) // max(len(r), 1)
+    if all(t.device.type == "cpu" and t.dtype == torch.float32 for t in (c, r, m)):
+        A, by_roughness = _KernelShading.run(transport, c, r, m)[1:]
+        c, m = c.repeat_interleave(lights, 0), m.repeat_interleave(lights)[:, None]
+    else:
+        c, r, m = c.repeat_interleave(lights, 0), r.repeat_interleave(lights), m.repeat_interleave(lights)[:, None]
+        r.requires_grad_()
+        A, B = interpolate(transport, r)
+        specular = (F0 * (1 - m) + m * c) * A + B
+        by_roughness = torch.stack([torch.autograd.grad(s.sum(), r, retain_graph=True)[0] for s in specular.unbind(1)], 1)
+        A = A.detach()
+    return Derivatives((1 - m) * transport.E + m * A, by_roughness, (c - F0) * A - c * transport.E)
+
+
 class _KernelShading(torch.autograd.Function):
     """`shade_reference` on the CPU in float32, compiled."""
 
@@ -105,13 +131,21 @@ class _KernelShading(torch.autograd.Function):
     def forward(  # type: ignore[override]
         ctx: Any, transport: Transport, albedo: Tensor, roughness: Tensor, metallic: Tensor
     ) -> Tensor:
+        radiance, A, by_roughness = _KernelShading.run(transport, albedo, roughness, metallic)
+        material = tuple(t.detach().numpy() for t in (albedo, roughness, metallic))
+        ctx.saved = (transport.E.float().contiguous().numpy(), A.numpy(), by_roughness.numpy(), material)
+        return radiance
+
+    @staticmethod
+    def run(transport: Transport, *material: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Radiance, interpolated A, and d radiance / d roughness: (P L, 3) each."""
         from stages.core import shading_kernels  # compiled code is loaded on first use
 
         light = tuple(t.float().contiguous().numpy() for t in (transport.E, transport.A, transport.B, transport.cosine))
-        material = tuple(t.detach().numpy() for t in (albedo, roughness, metallic))
-        radiance, A, by_roughness = shading_kernels.shade(light, material, KNOTS, (F0, LEAST_ALBEDO))  # type: ignore[arg-type]
-        ctx.saved = (light[0], A, by_roughness, material)
-        return torch.from_numpy(radiance)
+        values = tuple(t.detach().contiguous().numpy() for t in material)
+        out = shading_kernels.shade(light, values, KNOTS, (F0, LEAST_ALBEDO))  # type: ignore[arg-type]
+        a, b, c = map(torch.from_numpy, out)
+        return a, b, c
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[None, Tensor, Tensor, Tensor]:  # type: ignore[override]

@@ -3,15 +3,10 @@
 import torch
 from torch import Tensor
 
-from stages.core.shading import F0, Material
+from stages.core.shading import Material
 
 REACH = 0.05
 """Standard deviation of the smoothness loss's displacement, world units. Source: Zhang et al. 2024, DreamMat, Section 3.3."""
-
-PULL = 0.002
-TWIN_PULL = 0.1
-TWIN_NEAR, TWIN_FAR = 0.15, 0.35
-"""Weights of `plainness` and the window of its stronger pull. A residual of reference.HUBER weighs 0.03."""
 
 
 def displaced(points: Tensor, normals: Tensor, generator: torch.Generator) -> Tensor:
@@ -25,19 +20,6 @@ def smoothness(material: Material, nearby: Material) -> Tensor:
     albedo = (material.albedo - nearby.albedo).square().sum(-1)
     rest = (material.roughness - nearby.roughness).square() + (material.metallic - nearby.metallic).square()
     return (albedo + rest).mean()
-
-
-def plainness(material: Material) -> Tensor:
-    """What pictures leave open is taken for a rough dielectric; mean over points. Differentiable in: roughness, metallic.
-
-    A grey of albedo c <= F0 and metallic m looks exactly like its twin of albedo F0 (1 - m) and metallic 1 - c / F0. So
-    a dark dielectric's twin is a metal whose albedo is F0, whatever the dielectric's own: such a metal is pulled most.
-    Bright rough surfaces differ little whether metal or not, and unlit ones whether rough or not; there a slight pull
-    on all points is enough, which evidence overrules.
-    """
-    off = (material.albedo.detach() / F0 - 1).abs().amax(-1)  # relative distance of the albedo from F0
-    twin = ((TWIN_FAR - off) / (TWIN_FAR - TWIN_NEAR)).clamp(0.0, 1.0)
-    return (material.metallic * (PULL + TWIN_PULL * twin) + PULL * (1 - material.roughness)).mean()
 
 
 def bimodality(metallic: Tensor) -> Tensor:

@@ -21,7 +21,8 @@ from stages.core.schemas import MATERIAL
 from stages.core.shading import Material, shade
 from stages.distill import checkpoint, regularizers, schedule
 from stages.distill.checkpoint import State, step_generator
-from stages.distill.guidance.base import Budget, Guidance
+from stages.distill.gauss_newton import material_gradient
+from stages.distill.guidance.base import Budget, Guidance, Response
 from stages.distill.optimizer import RowAdam
 from stages.distill.options import DistillOptions
 from stages.distill.preview import write_preview
@@ -159,14 +160,26 @@ def optimisation_step(run: Run) -> float:
     with clock("shading"):
         radiance = shade(sample.transport, material)
     with clock("guidance"):
-        gradient, loss = run.guidance.gradient(radiance.detach(), sample, run.progress, generator)
-    if not (math.isfinite(loss) and bool(torch.isfinite(gradient).all())):
+        response = run.guidance.respond(radiance.detach(), sample, run.progress, generator)
+    if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
-        torch.autograd.backward([radiance, _regularizer(material, nearby, run)], [gradient, None])
+        _follow(response, sample, radiance, material, _regularizers(material, nearby, run), run.progress)
     with clock("optimiser"):
         state.optimizer.step(run.budget.learning_rate * schedule.learning_rate(run.progress))
-    return loss
+    return response.loss
+
+
+def _follow(
+    response: Response, sample: Sample, radiance: Tensor, material: Material, losses: list[Tensor], progress: float
+) -> None:
+    """Give the field's parameters the gradients that a response and losses on the material call for."""
+    if response.curvature is None:
+        torch.autograd.backward([radiance, *losses], [response.gradient, *[None] * len(losses)])
+        return
+    values = (material.albedo, material.roughness, material.metallic)
+    gradients = material_gradient(sample.transport, Material(*(t.detach() for t in values)), response, progress)
+    torch.autograd.backward([*values, *losses], [*gradients, *[None] * len(losses)])
 
 
 def _materials(
@@ -181,14 +194,16 @@ def _materials(
     return Material(*here), Material(*nearby)
 
 
-def _regularizer(material: Material, nearby: Material | None, run: Run) -> Tensor:
+def _regularizers(material: Material, nearby: Material | None, run: Run) -> list[Tensor]:
     """The weighted losses on the material itself."""
-    options, guidance, progress = run.options, run.guidance, run.progress
-    loss = guidance.plain * schedule.plain(progress) * regularizers.plainness(material)
-    if guidance.start is not None:  # words decide what a picture leaves open; a known target needs no such help
-        loss = loss + options.bimodal * schedule.bimodal(progress) * regularizers.bimodality(material.metallic)
-        loss = loss + options.anchor * regularizers.distance_of_means(material, guidance.start)
-    return loss if nearby is None else loss + options.smoothness * regularizers.smoothness(material, nearby)
+    options, expected = run.options, run.guidance.start
+    losses = []
+    if expected is not None:  # words decide what a picture leaves open; a known target needs no such help
+        losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(material.metallic))
+        losses.append(options.anchor * regularizers.distance_of_means(material, expected))
+    if nearby is not None:
+        losses.append(options.smoothness * regularizers.smoothness(material, nearby))
+    return losses
 
 
 class Clock:

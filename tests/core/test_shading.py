@@ -5,7 +5,18 @@ import torch
 from torch import Tensor
 
 from stages.core.albedo import specular_albedo
-from stages.core.shading import F0, KNOTS, LIGHT_MAPS, WIDTH, Material, Transport, light_maps, shade, shade_reference
+from stages.core.shading import (
+    F0,
+    KNOTS,
+    LIGHT_MAPS,
+    WIDTH,
+    Material,
+    Transport,
+    derivatives,
+    light_maps,
+    shade,
+    shade_reference,
+)
 
 
 def generator(seed: int = 0) -> torch.Generator:
@@ -46,6 +57,21 @@ def test_kernel_matches_at_and_beside_knots(roughness: float) -> None:
     at = Material(m.albedo, torch.full((50,), roughness), m.metallic)
     exact = Material(*(t.double() for t in (at.albedo, at.roughness, at.metallic)))
     torch.testing.assert_close(shade(light, at).double(), shade_reference(light.to(torch.float64), exact), rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("dtype, bound", [(torch.float64, 1e-6), (torch.float32, 1e-3)])
+def test_derivatives_are_differences_of_the_radiance(dtype: torch.dtype, bound: float) -> None:
+    """Central differences in float64 against the derivatives, compiled (float32) and plain (float64)."""
+    light, m, h = transport(40 * 3, dtype=torch.float64), material(40, dtype=torch.float64), 1e-6
+    by = derivatives(light.to(dtype), Material(*(t.to(dtype) for t in (m.albedo, m.roughness, m.metallic))))
+
+    def difference(c: float, r: float, k: float) -> Tensor:
+        ends = (Material(m.albedo + s * c, m.roughness + s * r, m.metallic + s * k) for s in (h, -h))
+        high, low = (shade_reference(light, end) for end in ends)
+        return (high - low) / (2 * h)
+
+    for found, wanted in ((by.albedo, (1, 0, 0)), (by.roughness, (0, 1, 0)), (by.metallic, (0, 0, 1))):
+        torch.testing.assert_close(found.double(), difference(*wanted), rtol=bound, atol=bound)
 
 
 def test_gradcheck_of_the_radiance_by_the_material() -> None:

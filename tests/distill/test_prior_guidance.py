@@ -72,14 +72,15 @@ def test_descent_moves_the_picture_towards_what_the_model_wants(views: Views, co
     """With no weight on the negative branch and the posterior term, mean over many draws, the gradient has one sign."""
     made = guidance(views, colour, eta1=0.0, eta2=(0.0, 0.0), posterior=1.0)
     sample, radiance, generator = shown(made)
-    gradients = [made.gradient(radiance, sample, 0.0, generator)[0] for _ in range(4)]
+    gradients = [made.respond(radiance, sample, 0.0, generator).gradient for _ in range(4)]
     assert torch.stack(gradients).mean(0).mul(sign).gt(0).float().mean() > 0.99
 
 
 def test_gradient_is_that_of_the_toned_picture_and_a_mean_over_pixels(views: Views) -> None:
     made = guidance(views, 0.2, batch=1)
     sample, radiance, _ = shown(made)
-    gradient, loss = made.gradient(radiance, sample, 0.0, torch.Generator().manual_seed(5))
+    response = made.respond(radiance, sample, 0.0, torch.Generator().manual_seed(5))
+    gradient, loss = response.gradient, response.loss
     exposure, _ = made._conditions(sample.images, sample)
     k = float(exposure)
     gain = profile.TONE_GAIN
@@ -92,7 +93,7 @@ def test_gradient_is_that_of_the_toned_picture_and_a_mean_over_pixels(views: Vie
 def test_all_branches_get_the_same_conditions_and_time(views: Views) -> None:
     made = guidance(views, 0.0, eta2=(1.0, 0.5))
     sample, radiance, generator = shown(made)
-    made.gradient(radiance, sample, 0.9, generator)
+    made.respond(radiance, sample, 0.9, generator)
     t, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
     assert conditions.shape == (6, 22, SIZE, SIZE)
     assert torch.equal(conditions[:2], conditions[2:4]) and torch.equal(conditions[:2], conditions[4:])
@@ -102,7 +103,7 @@ def test_all_branches_get_the_same_conditions_and_time(views: Views) -> None:
 def test_a_negative_prompt_without_weight_is_not_asked(views: Views) -> None:
     made = guidance(views, 0.0, eta2=(0.0, 0.0))
     sample, radiance, generator = shown(made)
-    made.gradient(radiance, sample, 0.9, generator)
+    made.respond(radiance, sample, 0.9, generator)
     _, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
     assert conditions.shape == (4, 22, SIZE, SIZE)
 
@@ -110,7 +111,7 @@ def test_a_negative_prompt_without_weight_is_not_asked(views: Views) -> None:
 def test_same_generator_same_gradient(views: Views) -> None:
     made = guidance(views, 0.3)
     sample, radiance, _ = shown(made)
-    a, b, c = (made.gradient(radiance, sample, 0.1, torch.Generator().manual_seed(s))[0] for s in (1, 1, 2))
+    a, b, c = (made.respond(radiance, sample, 0.1, torch.Generator().manual_seed(s)).gradient for s in (1, 1, 2))
     assert torch.equal(a, b) and not torch.equal(a, c)
 
 

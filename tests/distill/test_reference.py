@@ -91,11 +91,36 @@ def test_gradient_vanishes_at_the_truth_and_points_to_it(conditions: Path, tmp_p
     assert sample.rows is not None
     truth = torch.from_numpy(asset.material_at(seen.points.numpy(), seen.eyes.numpy())[0])[sample.rows]
     radiance = shade(sample.transport, Material(truth[:, :3].contiguous(), truth[:, 3], truth[:, 4]))
-    gradient, loss = guidance.gradient(radiance, sample, 0.0, generator)
-    assert loss < 1e-5 and float(gradient.abs().sum()) < 1e-4
+    response = guidance.respond(radiance, sample, 0.0, generator)
+    assert response.loss < 1e-5 and float(response.gradient.abs().sum()) < 1e-4
     for factor, sign in ((1.02, 1), (0.98, -1)):
-        gradient, loss = guidance.gradient(radiance * factor, sample, 0.0, generator)
-        assert loss == pytest.approx(0.02, rel=0.15) and bool((gradient * sign > 0).all())
+        response = guidance.respond(radiance * factor, sample, 0.0, generator)
+        assert response.loss == pytest.approx(0.02, rel=0.15) and bool((response.gradient * sign > 0).all())
+
+
+def test_curvature_is_the_gradients_slope_for_small_residuals(conditions: Path, tmp_path: Path) -> None:
+    asset, seen = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY), pool(conditions)
+    guidance = ReferenceGuidance(asset, seen)
+    generator = torch.Generator().manual_seed(1)
+    sample = seen.draw(generator)
+    assert sample.rows is not None
+    truth = torch.from_numpy(asset.material_at(seen.points.numpy(), seen.eyes.numpy())[0])[sample.rows]
+    radiance = shade(sample.transport, Material(truth[:, :3].contiguous(), truth[:, 3], truth[:, 4]))
+    step = 0.003 * radiance
+    up, down = (guidance.respond(radiance + sign * step, sample, 0.0, generator) for sign in (1, -1))
+    assert up.curvature is not None
+    slope = (up.gradient - down.gradient) / (2 * step)
+    torch.testing.assert_close(slope, guidance.respond(radiance, sample, 0.0, generator).curvature, rtol=0.02, atol=0)
+
+
+def test_far_residuals_weigh_less_but_still_pull(conditions: Path, tmp_path: Path) -> None:
+    asset, seen = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY), pool(conditions)
+    guidance = ReferenceGuidance(asset, seen)
+    sample = seen.draw(torch.Generator().manual_seed(1))
+    radiance = 10 * shade(sample.transport, Material(torch.ones(64, 3), torch.full((64,), 0.5), torch.zeros(64)))
+    near, far = (guidance.respond(k * radiance, sample, 0.0, torch.Generator()) for k in (1, 10))
+    assert near.curvature is not None and far.curvature is not None
+    assert bool((far.curvature * 100 < near.curvature).all()) and bool((far.gradient > 0).all())
 
 
 def test_bad_models_are_one_line_errors(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 import torch
 
-from stages.core.shading import F0, Material
+from stages.core.shading import Material
 from stages.distill import regularizers
 
 
@@ -29,15 +29,6 @@ def test_bimodality_is_zero_at_both_ends_and_pushes_away_from_the_middle() -> No
     assert float(regularizers.bimodality(torch.tensor([0.0, 1.0]))) == 0
     (gradient,) = torch.autograd.grad(loss, metallic)
     assert gradient[2] > 0 > gradient[3]
-
-
-def test_plainness_pulls_to_rough_dielectrics_and_most_where_a_metal_has_a_dielectric_twin() -> None:
-    albedo = torch.tensor([[F0] * 3, [0.5] * 3, [F0, F0, 0.5]])
-    metallic, roughness = torch.full((3,), 0.8, requires_grad=True), torch.full((3,), 0.3, requires_grad=True)
-    loss = regularizers.plainness(Material(albedo, roughness, metallic))
-    by_metallic, by_roughness = torch.autograd.grad(loss, (metallic, roughness))
-    assert by_metallic[0] > 10 * by_metallic[1] > 0 and by_metallic[2] == by_metallic[1]
-    assert (by_roughness < 0).all()
 
 
 def test_distance_of_means_lets_points_differ() -> None:

@@ -15,6 +15,7 @@ from stages.core.field import MaterialField
 from stages.core.schemas import MATERIAL
 from stages.distill import checkpoint, stage
 from stages.distill.guidance import reference
+from stages.distill.guidance.base import Response
 from stages.distill.options import DistillOptions
 from stages.distill.stage import distill
 from stages.distill.views import Views
@@ -187,9 +188,9 @@ def test_users_mistakes_are_one_line(folder: Path, tmp_path: Path) -> None:
 
 def test_non_finite_gradient_names_step_and_seed(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def nonsense(self, radiance, sample, progress, generator):  # type: ignore[no-untyped-def]
-        return radiance * (float("nan") if progress > 0.5 else 0.0), 0.0
+        return Response(radiance * (float("nan") if progress > 0.5 else 0.0), 0.0)
 
-    monkeypatch.setattr(reference.ReferenceGuidance, "gradient", nonsense)
+    monkeypatch.setattr(reference.ReferenceGuidance, "respond", nonsense)
     out = tmp_path / "material.npz"
     with pytest.raises(NumericalError, match=r"step 7: .*seed 0"):
         distill(folder / "conditions", out, options(folder))

@@ -22,13 +22,29 @@ class Budget:
     learning_rate: float
 
 
+@dataclass(frozen=True)
+class Response:
+    """What a guidance answers to rendered pixels.
+
+    gradient: (P L, 3) of its loss, scaled to a mean over pixels. loss: a number for the curve. curvature: (P L, 3) second
+    derivative of the loss by each value, scaled alike, where the loss is one of least squares: the material is then
+    stepped by `stages.distill.gauss_newton`. plain: with a curvature, how far a step takes metallic down and roughness up
+    where the pictures leave them open.
+    """
+
+    gradient: Tensor
+    loss: float
+    curvature: Tensor | None = None
+    plain: float = 0.0
+
+
 class Guidance(Protocol):
     """What an optimisation step asks.
 
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
     inputs: role -> SHA-256 of the files it was made from. start: (5,) linear albedo, roughness and metallic from which
     the field had best begin, or None where it makes no difference. budget: what it calls for where the options leave it
-    open. plain: weight of `regularizers.plainness`, which decides what the pictures leave open.
+    open.
     """
 
     @property
@@ -38,16 +54,11 @@ class Guidance(Protocol):
     inputs: dict[str, str]
     start: Tensor | None
     budget: Budget
-    plain: float
 
-    def gradient(
-        self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator
-    ) -> tuple[Tensor, float]:
-        """Gradient of this guidance's loss with respect to the rendered pixels.
+    def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
+        """Which way the rendered pixels should go.
 
         Args:
             radiance: (P L, 3) linear, of the sample's points under its lights; detached. progress: in [0, 1).
             generator: a CPU generator, the only source of random numbers.
-        Returns:
-            gradient (P L, 3), scaled to a mean over pixels; and a number for the curve.
         """

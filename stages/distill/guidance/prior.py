@@ -15,7 +15,7 @@ from torch import Tensor
 from stages.core.color import srgb_decode
 from stages.core.shading import light_maps
 from stages.distill import schedule
-from stages.distill.guidance.base import Budget
+from stages.distill.guidance.base import Budget, Response
 from stages.distill.guidance.csd import classifier_score, posterior_score
 from stages.distill.options import DistillOptions
 from stages.distill.sampling import CropSampler, Images, Sample
@@ -46,7 +46,7 @@ class PriorGuidance:
         self.sampler = sampler
         self.identity: dict[str, Any] = prior.identity
         self.inputs = {"prior": prior.identity["weights"]}
-        self.budget, self.plain = BUDGET, 0.0
+        self.budget = BUDGET
         self._prior, self._options = prior, options
         words = ("front view", "side view", "back view", "overhead view")
         self._positive = {word: prior.embed([f"{options.prompt}, {word}"]) for word in words}
@@ -54,10 +54,8 @@ class PriorGuidance:
         expected = prior.expected_material([options.prompt])[0]
         self.start: Tensor | None = torch.cat([srgb_decode(expected[:3]), expected[3:]])
 
-    def gradient(
-        self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator
-    ) -> tuple[Tensor, float]:
-        """See `Guidance.gradient`; the number for the curve is the root mean square of the score on the picture."""
+    def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
+        """See `Guidance.respond`; the number for the curve is the root mean square of the score on the picture."""
         assert sample.images is not None
         images, prior = sample.images, self._prior
         exposure, conditions = self._conditions(images, sample)
@@ -65,7 +63,8 @@ class PriorGuidance:
         picture = prior.profile_tone(exposure * images.paint(leaf))  # (B, 3, S, S)
         score = self._score(picture.detach(), conditions, images, progress, generator)
         (gradient,) = torch.autograd.grad(picture, leaf, score / len(radiance))
-        return gradient, float((score * images.paint(torch.ones_like(radiance[:, :1]))).square().mean().sqrt())
+        on_object = images.paint(torch.ones_like(radiance[:, :1]))
+        return Response(gradient, float((score * on_object).square().mean().sqrt()))
 
     def _conditions(self, images: Images, sample: Sample) -> tuple[Tensor, Tensor]:
         """Exposure (B, 1, 1, 1) and condition channels (B, 22, S, S)."""

@@ -23,7 +23,8 @@ from stages.core.color import srgb_decode
 from stages.core.errors import InputError
 from stages.core.frames import transform_points
 from stages.core.shading import Material, shade
-from stages.distill.guidance.base import Budget
+from stages.distill import schedule
+from stages.distill.guidance.base import Budget, Response
 from stages.distill.sampling import PixelSampler, Sample
 from stages.light.scene import Scene
 
@@ -41,8 +42,12 @@ MAX_MISSED = 0.05
 CHUNK = 16384
 """Pixels whose target is shaded at once."""
 
-HUBER = 0.03
+HUBER = 0.1
 """Residual, in nepers of radiance, beyond which the loss grows linearly."""
+
+PLAIN = 0.1
+"""Step towards a rough dielectric where nothing else is seen. A grey of albedo c < F0 and metallic m looks exactly like its
+twin of albedo F0 (1 - m) and metallic 1 - c / F0: a dark dielectric like some metal. Of such twins the duller is taken."""
 
 FLOOR = 0.001
 """Radiance at which the logarithmic scale turns linear, as a share of the light's mean over all seen pixels. The target
@@ -157,23 +162,25 @@ class ReferenceGuidance:
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
         self.start: Tensor | None = None
-        self.budget, self.plain = BUDGET, 1.0
+        self.budget = BUDGET
         self._found = torch.from_numpy(found)
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)
         self._floor = FLOOR * self._target.mean((0, 2))  # (L,)
 
-    def gradient(
-        self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator
-    ) -> tuple[Tensor, float]:
-        """See `Guidance.gradient`; the number for the curve is the mean absolute residual, in nepers."""
+    def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
+        """See `Guidance.respond`; the number for the curve is the mean absolute residual, in nepers."""
         assert sample.rows is not None
         device = radiance.device
         floor = self._floor.to(device)[:, None]
         shown = radiance.view(-1, sample.lights, 3) + floor
         target = self._target.index_select(0, sample.rows).to(device) + floor
-        residual = torch.log(shown / target) * self._found[sample.rows].to(device)[:, None, None]
-        gradient = residual.clamp(-HUBER, HUBER) / (shown * residual.numel())
-        return gradient.flatten(0, 1), float(residual.abs().mean())
+        found = self._found[sample.rows].to(device)[:, None, None]
+        residual = torch.log(shown / target) * found
+        weight = (HUBER / residual.abs().clamp(min=HUBER)) / residual.numel()  # 1 up to HUBER, then falling
+        weight = weight * found
+        gradient, curvature = weight * residual / shown, weight / shown.square()
+        plain = PLAIN * schedule.plain(progress)
+        return Response(gradient.flatten(0, 1), float(residual.abs().mean()), curvature.flatten(0, 1), plain)
 
 
 def _target_radiance(sampler: PixelSampler, truth: Tensor) -> Tensor:
