@@ -4,9 +4,9 @@ With transport E, A(r), B(r) of one pixel and one environment (see `stages.light
 
     radiance = (1 - m) c E + (F0 (1 - m) + m c) A(r) + B(r),   F0 = 0.04
 
-A and B are stored at the roughness `KNOTS`. Between them, what is interpolated is A and B relative to the albedo of an
-open point (`core.albedo`), by a monotone cubic: exact in a white furnace, and a third of the error of straight lines
-under real lights.
+A and B are stored at the roughness `KNOTS`. Between them, what is interpolated is the logarithm of A and B relative to
+the albedo of an open point (`core.albedo`), by a cubic: exact in a white furnace, and right for a small lamp too, whose
+reflection spreads as a power of the roughness.
 """
 
 from collections.abc import Sequence
@@ -61,6 +61,13 @@ class Transport:
 
 WIDTH = 3 + 6 * len(KNOTS) + 1
 """Values of a point in packed form."""
+
+DARK = 0.01
+"""Relative A and B are raised by this share of the roughest knot's before the logarithm is taken: black is not minus
+infinity."""
+
+TINY = 6e-5
+"""The least of that: the smallest normal number that is stored."""
 
 LEAST_ALBEDO = 1e-4
 """Under this an open point's albedo is no scale to interpolate by (B, seen head-on); B itself is interpolated there."""
@@ -143,7 +150,7 @@ class _KernelShading(torch.autograd.Function):
 
         light = tuple(t.float().contiguous().numpy() for t in (transport.E, transport.A, transport.B, transport.cosine))
         values = tuple(t.detach().contiguous().numpy() for t in material)
-        out = shading_kernels.shade(light, values, KNOTS, (F0, LEAST_ALBEDO))  # type: ignore[arg-type]
+        out = shading_kernels.shade(light, values, KNOTS, (F0, LEAST_ALBEDO, DARK, TINY))  # type: ignore[arg-type]
         a, b, c = map(torch.from_numpy, out)
         return a, b, c
 
@@ -162,7 +169,7 @@ def interpolate(
 ) -> tuple[Tensor, Tensor]:
     """A and B at the given roughness, from the knots of the given numbers.
 
-    Source: Fritsch & Butland 1984, monotone piecewise cubic interpolation with harmonic-mean slopes.
+    A cubic Hermite spline of log(y + DARK y_last), with the slopes of parabolas through three knots.
 
     Args:
         roughness: (P,) in [0, 1].
@@ -178,7 +185,10 @@ def interpolate(
     row = torch.arange(len(roughness), device=roughness.device)[:, None]
     place = every[near]
     stacked = torch.cat([transport.A[row, place], transport.B[row, place]], -1).to(roughness.dtype)  # (P, 4, 6)
-    y = stacked / _knot_albedo(transport.cosine.to(roughness.dtype))[row, place].repeat_interleave(3, -1)
+    scale = _knot_albedo(transport.cosine.to(roughness.dtype)).repeat_interleave(3, -1)  # (P, K, 6)
+    roughest = torch.cat([transport.A[:, every[-1]], transport.B[:, every[-1]]], -1).to(roughness.dtype) / scale[:, every[-1]]
+    dark = DARK * roughest.clamp(min=0) + TINY  # (P, 6)
+    y = torch.log((stacked / scale[row, place]).clamp(min=0) + dark[:, None])
     step = (r[:, 1:] - r[:, :-1])[..., None]  # (P, 3, 1); 0 beyond the ends
     rise = (y[:, 1:] - y[:, :-1]) / torch.where(step > 0, step, torch.ones_like(step))
     slope_left = _slope(rise[:, 0], rise[:, 1], step[:, 0], step[:, 1])
@@ -186,7 +196,8 @@ def interpolate(
     h = step[:, 1]
     x = (roughness[:, None] - r[:, 1:2]) / h
     ease, tail = x * x * (3 - 2 * x), x * x * (x - 1)
-    relative = y[:, 1] * (1 - ease) + y[:, 2] * ease + h * (slope_left * x * (1 - x) ** 2 + slope_right * tail)
+    spline = y[:, 1] * (1 - ease) + y[:, 2] * ease + h * (slope_left * x * (1 - x) ** 2 + slope_right * tail)
+    relative = torch.exp(spline) - dark
     albedo = specular_albedo(roughness, transport.cosine.to(roughness.dtype)).clamp(min=LEAST_ALBEDO)
     A, B = (relative * albedo.repeat_interleave(3, -1)).split(3, -1)
     return A, B
@@ -199,15 +210,11 @@ def _knot_albedo(cosine: Tensor) -> Tensor:
 
 
 def _slope(before: Tensor, after: Tensor, step_before: Tensor, step_after: Tensor) -> Tensor:
-    """Slope at a knot from those of its two intervals: their weighted harmonic mean, 0 at an extremum.
+    """Slope at a knot of the parabola through it and its neighbours, from the slopes and widths of its two intervals.
 
     At the ends, where one interval has no width, it is the slope of the other.
     """
-    wide, narrow = step_before + 2 * step_after, 2 * step_before + step_after
-    same = before * after > 0
-    a, b = (torch.where(same, t, torch.ones_like(t)) for t in (before, after))
-    mean = (wide + narrow) / (narrow / a + wide / b)
-    inner = torch.where(same, mean, torch.zeros_like(mean))
+    inner = (before * step_after + after * step_before) / (step_before + step_after)
     return torch.where(step_before > 0, torch.where(step_after > 0, inner, before), after)
 
 

@@ -28,13 +28,13 @@ def shade(
     transport: tuple[Values, Values, Values, Values],
     material: tuple[Values, Values, Values],
     knots: tuple[float, ...],
-    constants: tuple[float, float],
+    constants: tuple[float, float, float, float],
 ) -> tuple[Values, Values, Values]:
     """Radiance and what its gradient needs.
 
     Args:
         transport: E (N, 3), A and B (N, K, 3), cosine (N,). material: albedo (P, 3), roughness (P,), metallic (P,);
-        N = P L. constants: F0 and the least albedo to interpolate by.
+        N = P L. constants: F0, the least albedo to interpolate by, DARK and the least DARK y.
     Returns:
         radiance, interpolated A, and d radiance / d roughness: (N, 3) each.
     """
@@ -42,7 +42,7 @@ def shade(
     lights = count // max(len(material[1]), 1)
     out = tuple(np.empty((count, 3), np.float32) for _ in range(3))
     tables = (_knot_table(knots), albedo.table(), np.array(knots, np.float32))
-    floats = (np.float32(constants[0]), np.float32(constants[1]))
+    floats = tuple(map(np.float32, constants))
     tasks = [
         (part.start, lights, *(t[part] for t in transport), *material, *tables, *floats, *(o[part] for o in out))
         for part in slices(count, ROWS_PER_TASK)
@@ -75,21 +75,19 @@ def _slope(before, after, step_before, step_after):  # type: ignore[no-untyped-d
         return after
     if step_after <= 0:
         return before
-    if before * after <= 0:
-        return np.float32(0)
-    wide, narrow = step_before + 2 * step_after, 2 * step_before + step_after
-    return (wide + narrow) / (narrow / before + wide / after)
+    return (before * step_after + after * step_before) / (step_before + step_after)
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
 def _shade(  # type: ignore[no-untyped-def]
-    first, lights, E, A, B, cosine, c, roughness, metallic, knot_table, table, knots, f0, least, out, out_a, out_r
+    first, lights, E, A, B, cosine, c, roughness, metallic, knot_table, table, knots, f0, least, dark, tiny, out, out_a, out_r
 ):
     one = np.float32(1)
     last = len(knots) - 1
     rows, columns = len(table), table.shape[1]
     y, value, slope = np.empty(4, np.float32), np.empty(2, np.float32), np.empty(2, np.float32)
-    near, step = np.empty(4, np.int64), np.empty(3, np.float32)
+    near, step, scale = np.empty(5, np.int64), np.empty(3, np.float32), np.empty((5, 2), np.float32)
+    near[4] = last
     open_point, by_r = np.empty(2, np.float32), np.empty(2, np.float32)
     for i in range(len(E)):
         p = (first + i) // lights
@@ -117,21 +115,29 @@ def _shade(  # type: ignore[no-untyped-def]
             exact = low * (one - fv) + high * fv
             open_point[term] = max(exact, least)
             by_r[term] = (high - low) * np.float32(rows - 1) if exact >= least else np.float32(0)
+        for k in range(5):
+            for term in range(2):
+                n = near[k]
+                known = knot_table[n, column, term] * (one - fu) + knot_table[n, column + 1, term] * fu
+                scale[k, term] = one / max(known, least)
         for j in range(3):
             for term in range(2):
+                roughest = A[i, last, j] if term == 0 else B[i, last, j]
+                least_y = dark * max(roughest * scale[4, term], np.float32(0)) + tiny
                 for k in range(4):
                     n = near[k]
-                    scale = knot_table[n, column, term] * (one - fu) + knot_table[n, column + 1, term] * fu
-                    y[k] = (A[i, n, j] if term == 0 else B[i, n, j]) / max(scale, least)
+                    stored = A[i, n, j] if term == 0 else B[i, n, j]
+                    y[k] = np.log(max(stored * scale[k, term], np.float32(0)) + least_y)
                 rise0 = (y[1] - y[0]) / step[0] if step[0] > 0 else np.float32(0)
                 rise1 = (y[2] - y[1]) / h
                 rise2 = (y[3] - y[2]) / step[2] if step[2] > 0 else np.float32(0)
                 a = _slope(rise0, rise1, step[0], h)
                 b = _slope(rise1, rise2, h, step[2])
-                relative = y[1] * (one - ease) + y[2] * ease + h * (a * head + b * tail)
+                raised = np.exp(y[1] * (one - ease) + y[2] * ease + h * (a * head + b * tail))
+                relative = raised - least_y
                 change = rise1 * 6 * x * (one - x) + a * (one - x) * (one - 3 * x) + b * x * (3 * x - 2)
                 value[term] = relative * open_point[term]
-                slope[term] = change * open_point[term] + relative * by_r[term]
+                slope[term] = raised * change * open_point[term] + relative * by_r[term]
             diffuse, f = (one - m) * c[p, j], f0 * (one - m) + m * c[p, j]
             out[i, j] = diffuse * E[i, j] + f * value[0] + value[1]
             out_a[i, j] = value[0]

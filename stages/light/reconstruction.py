@@ -74,12 +74,17 @@ def smoothed(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighb
     return result.reshape(mean.shape)
 
 
-def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], count: int) -> NDArray[np.int64]:
-    """Rows of the points whose tone-mapped sums, x / (1 + x), have the largest variance, ascending. Args: (P, ...) each."""
+def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, count: int) -> NDArray[np.int64]:
+    """Rows of the points with most noise left once smoothed, in tone-mapped sums, x / (1 + x); ascending.
+
+    A point on a thin rim, whose neighbours lie on other surfaces, keeps all its noise; one on a flat loses most of it.
+    """
     if count == 0:
         return np.zeros(0, np.int64)
+    flat, noise = (np.ascontiguousarray(a.reshape(len(mean), int(np.prod(mean.shape[1:])))) for a in (mean, noise))
     score = np.empty(len(mean), np.float32)
-    _in_parts(lambda start, end: _score(mean, noise, start, end, score), len(mean), POINTS_PER_TASK)
+    geometry = (near.index, near.pixel, near.n, near.point)
+    _in_parts(lambda start, end: _score(flat, noise, *geometry, start, end, score), len(mean), POINTS_PER_TASK)
     return np.sort(np.argpartition(-score, count - 1)[:count])
 
 
@@ -117,16 +122,27 @@ def _variance(gap, index, first, end, result):  # type: ignore[no-untyped-def]
 
 
 @fast
-def _score(mean, noise, start, end, result):  # type: ignore[no-untyped-def]
+def _same(n, point, p, q):  # type: ignore[no-untyped-def]
+    """How far two points count as of one surface, 0 to 1."""
     f32 = np.float32
-    for p in range(start, end):
-        total = f32(0)
-        for j in range(mean.shape[1]):
-            for c in range(mean.shape[2]):
-                slope = f32(1) / (f32(1) + max(mean[p, j, c], f32(0)))
-                slope *= slope
-                total += noise[p, j, c] * slope * slope
-        result[p] = total
+    turned, out, distance = f32(0), f32(0), f32(1e-20)
+    for d in range(3):
+        turned += (n[p, d] - n[q, d]) ** 2
+        step = point[q, d] - point[p, d]
+        out += step * n[p, d]
+        distance += step * step
+    same = max(f32(0), f32(1) - turned * f32(NORMALS))
+    return same * max(f32(0), f32(1) - out * out / (distance * f32(BEND)))
+
+
+@fast
+def _alike(mean, noise, p, q, k):  # type: ignore[no-untyped-def]
+    """How far noise explains the difference of one sum at two points, 0 to 1."""
+    f32 = np.float32
+    difference = mean[p, k] - mean[q, k]
+    allowed = f32(TOLERANCE) * (noise[p, k] + min(noise[p, k], noise[q, k])) + f32(1e-20)
+    near = max(f32(0), f32(1) - difference * difference / allowed)
+    return near * near
 
 
 @fast
@@ -144,22 +160,43 @@ def _smoothed(mean, noise, index, pixel, n, point, start, end, result):  # type:
                 q = index[j, i]
                 if q < 0 or q == p:
                     continue
-                turned, out, distance = f32(0), f32(0), f32(1e-20)
-                for d in range(3):
-                    turned += (n[p, d] - n[q, d]) ** 2
-                    step = point[q, d] - point[p, d]
-                    out += step * n[p, d]
-                    distance += step * step
-                same = max(f32(0), f32(1) - turned * f32(NORMALS))
-                same *= max(f32(0), f32(1) - out * out / (distance * f32(BEND)))
-                if same <= 0:
+                same = _same(n, point, p, q)
+                if same <= f32(0):
                     continue
                 for k in range(size):
-                    difference = mean[p, k] - mean[q, k]
-                    allowed = f32(TOLERANCE) * (noise[p, k] + min(noise[p, k], noise[q, k])) + f32(1e-20)
-                    near = max(f32(0), f32(1) - difference * difference / allowed)
-                    w = same * near * near
+                    w = same * _alike(mean, noise, p, q, k)
                     weight[k] += w
                     total[k] += w * mean[q, k]
         for k in range(size):
             result[p, k] = total[k] / weight[k]
+
+
+@fast
+def _score(mean, noise, index, pixel, n, point, start, end, result):  # type: ignore[no-untyped-def]
+    """The variance that `_smoothed` leaves, summed over the tone-mapped sums."""
+    f32 = np.float32
+    height, width = index.shape
+    size = mean.shape[1]
+    total, weight = np.empty(size, np.float32), np.empty(size, np.float32)
+    for p in range(start, end):
+        x, y = pixel[p]
+        total[:] = noise[p]
+        weight[:] = 1
+        for j in range(max(y - RADIUS, 0), min(y + RADIUS, height - 1) + 1):
+            for i in range(max(x - RADIUS, 0), min(x + RADIUS, width - 1) + 1):
+                q = index[j, i]
+                if q < 0 or q == p:
+                    continue
+                same = _same(n, point, p, q)
+                if same <= f32(0):
+                    continue
+                for k in range(size):
+                    w = same * _alike(mean, noise, p, q, k)
+                    weight[k] += w
+                    total[k] += w * w * noise[q, k]
+        left = f32(0)
+        for k in range(size):
+            slope = f32(1) / (f32(1) + max(mean[p, k], f32(0)))
+            slope *= slope / weight[k]
+            left += total[k] * slope * slope
+        result[p] = left

@@ -54,8 +54,8 @@ STORED = 2 * len(KNOTS) + 1
 MIRROR = (1, 1 + len(KNOTS))
 """Where among them roughness 0 is. It is looked up, not summed."""
 
-JUDGED = slice(1 + KNOTS.index(0.5), 1 + len(KNOTS))
-"""A at roughness 0.5 and more, by which noise is judged."""
+JUDGED = [0, 1 + KNOTS.index(0.5), 1 + KNOTS.index(1.0)]
+"""E and A at roughness 0.5 and 1, by which noise is judged: all that a picture of a rough thing is made of."""
 
 SHARP = [m + 1 for m in MIRROR]
 """The least rough lobe, which shows edges that no neighbour knows of: left as it was traced."""
@@ -80,7 +80,7 @@ class Quality:
         return replace(self, lobe=max(2, round(self.lobe * factor)), light=max(2, round(self.light * factor)))
 
 
-EXTRA_SHARE, EXTRA_RAYS = 0.2, 3.0
+EXTRA_SHARE, EXTRA_RAYS = 0.15, 3.5
 """Share of the points that trace more, and how many times the rays of the others."""
 
 SEED_STEP = 0x5EED
@@ -89,7 +89,7 @@ SEED_STEP = 0x5EED
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
 
-QUALITY = {"draft": Quality(24, 6), "standard": Quality(48, 14), "high": Quality(256, 72)}
+QUALITY = {"draft": Quality(18, 10), "standard": Quality(36, 22), "high": Quality(200, 120)}
 
 LOBE_SHARES = np.array([0.22, 0.03, 0.05, 0.08, 0.11, 0.14, 0.14, 0.12, 0.11])
 """Share of the lobe rays: the cosine lobe, then each knot but the mirror."""
@@ -136,14 +136,16 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
 
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
     """`light_transport` for lights that are already split."""
+    near = reconstruction.Neighbours.of(points)
     sums = trace(scene, points, lights, quality, seed)
     if quality.extra:
-        worst = reconstruction.noisiest(sums.mean[:, JUDGED], sums.variance[:, JUDGED], int(EXTRA_SHARE * len(points.n)))
+        judged = sums.mean[:, JUDGED], sums.variance[:, JUDGED]
+        worst = reconstruction.noisiest(*judged, near, int(EXTRA_SHARE * len(points.n)))
         add(sums, worst, trace(scene, points[worst], lights, quality.scaled(EXTRA_RAYS), seed + SEED_STEP), EXTRA_RAYS)
     mean = sums.mean
     if quality.smooth:
         sums.variance[:, SHARP] = 0
-        mean = reconstruction.smoothed(mean, sums.variance, reconstruction.Neighbours.of(points))
+        mean = reconstruction.smoothed(mean, sums.variance, near)
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
     return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
 

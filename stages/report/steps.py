@@ -30,7 +30,7 @@ CHUNK = 2048
 TIMED = 16_384
 """Pixels by which Monte Carlo is timed; seconds are scaled to the view."""
 
-PIXELS = 24
+PIXELS = 192
 ROWS = 512
 """Rows of directions of the quadrature, at least."""
 

@@ -60,8 +60,25 @@ def test_another_surface_is_not_mixed_in() -> None:
     assert result == pytest.approx(truth, abs=1e-5)
 
 
+def alone(count: int) -> Neighbours:
+    """Points in a row, each on a surface of its own."""
+    near = plane(1, count)
+    near.point[:, 2] = 100 * np.arange(count)
+    return near
+
+
 def test_noisiest_is_judged_as_seen() -> None:
     mean = np.array([1.0, 100.0, 1.0, 1.0], np.float32).reshape(4, 1, 1)
     noise = np.array([0.1, 5.0, 0.3, 0.2], np.float32).reshape(4, 1, 1)
-    assert noisiest(mean, noise, 2).tolist() == [2, 3]  # a bright point's noise is not seen
-    assert noisiest(mean, noise, 0).tolist() == []
+    assert noisiest(mean, noise, alone(4), 2).tolist() == [2, 3]  # a bright point's noise is not seen
+    assert noisiest(mean, noise, alone(4), 0).tolist() == []
+
+
+def test_noisiest_is_what_smoothing_leaves() -> None:
+    """A thin rim in front of a wall: as noisy as the wall, but with fewer neighbours to share the noise with."""
+    near = plane()
+    rim = near.pixel[:, 1] == 12
+    near.point[rim, 2] = 20.0
+    near.n[rim] = [0, 1, 0]
+    mean, noise = np.ones((len(rim), 1, 1), np.float32), np.full((len(rim), 1, 1), 0.01, np.float32)
+    assert rim[noisiest(mean, noise, near, int(rim.sum()))].all()
