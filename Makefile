@@ -6,6 +6,7 @@ RUN    := $(VENV)/bin
 DREAMMAT := $(RUN)/dreammat
 VALIDATOR := $(VENV)/.validator
 MITSUBA := $(VENV)/.mitsuba
+CYCLES  := $(VENV)/.cycles
 
 # one job: make asset MESH=chair.obj PROMPT="a carved oak chair" OUT=assets/chair
 MESH   ?=
@@ -95,15 +96,21 @@ lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .
 	$(RUN)/mypy
 
-bench: demo/urn.obj | $(MITSUBA)  ## speed against error of the light transport, beside Mitsuba 3 where pip has it
+bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light transport, beside Mitsuba 3 and Cycles
 	$(MAKE) demo/prep.npz
-	$(DREAMMAT) report conditions demo/prep.npz -o bench $$([ -s $(MITSUBA) ] && echo --mitsuba $$(cat $(MITSUBA)))
+	$(DREAMMAT) report conditions demo/prep.npz -o bench $$(cat $(MITSUBA) $(CYCLES))
 	@echo "look at bench/conditions.png"
 
-# Mitsuba in a virtual environment of its own; an empty file where it cannot be had
+# other renderers, each in a virtual environment of its own; an empty file where it cannot be had or does not run
 $(MITSUBA): | $(VENV)/.ready
 	@$(PYTHON) -m venv $(VENV)/mitsuba && $(VENV)/mitsuba/bin/python -m pip install --quiet mitsuba && \
-	echo $(VENV)/mitsuba/bin/python > $@ || { echo "pip cannot install mitsuba: no side-by-side with it"; : > $@; }
+	$(VENV)/mitsuba/bin/python -c 'import mitsuba; mitsuba.set_variant("llvm_ad_rgb"); print(mitsuba.Float(1) + 1)' >/dev/null && \
+	echo --mitsuba $(VENV)/mitsuba/bin/python > $@ || { echo "mitsuba does not run here: no side-by-side with it"; : > $@; }
+
+$(CYCLES): | $(VENV)/.ready
+	@$(PYTHON) -m venv $(VENV)/cycles && $(VENV)/cycles/bin/python -m pip install --quiet 'bpy>=4.2,<5' && \
+	$(VENV)/cycles/bin/python -c 'import bpy' && \
+	echo --cycles $(VENV)/cycles/bin/python > $@ || { echo "bpy does not run here: no side-by-side with Cycles"; : > $@; }
 
 clean:  ## remove the virtual environment and the demo
 	rm -rf $(VENV) demo

@@ -27,6 +27,8 @@ def command() -> None:
               help="Of camera and rays.")
 @click.option("--mitsuba", default=DEFAULT["mitsuba"], metavar="PYTHON",
               help="A Python that has the package mitsuba, for a side-by-side with it.")
+@click.option("--cycles", default=DEFAULT["cycles"], metavar="PYTHON",
+              help="A Python that has the package bpy (Blender), for a side-by-side with Cycles.")
 @common_options
 def conditions(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
     """Light transport of one view of PREP.npz: seconds and error of every setting, and the cost of a step."""

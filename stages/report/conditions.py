@@ -3,7 +3,7 @@
 One view, in which the object fills about 42 % of the pixels, is traced at every setting. Errors are those of the six
 light maps, tone-mapped by x / (1 + x), at random object pixels, against a converged result: far more rays, no smoothing,
 other seeds. That result itself is held against float64 quadrature at a few pixels. Written: conditions.csv, a line for
-each setting, environment and map; steps.csv; conditions.png; and mitsuba.csv where that renderer is at hand.
+each setting, environment and map; steps.csv; conditions.png; and renderers.csv where Mitsuba or Cycles is at hand.
 """
 
 import csv
@@ -35,7 +35,7 @@ from stages.light.light_set import LightSet
 from stages.light.reference import reference_transport
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, Quality, cached_light_set, integrate
-from stages.report import mitsuba_job, plots, steps
+from stages.report import plots, renderers, steps
 from stages.report.options import ReportOptions
 
 COVERAGE = 0.42
@@ -112,11 +112,13 @@ def report_conditions(prep: Path, out: Path, options: ReportOptions, progress: P
     write_csv(out / "steps.csv", steps.measure(subject.scene, subject.points, subject.lights, options.seed))
     progress("steps", 1, 1)
     plots.frontier(out / "conditions.png", rows, f"{Path(prep).stem}, {options.size}², {len(subject.points.n)} pixels")
-    if options.mitsuba:
-        progress("mitsuba", 0, 1)
-        job = mitsuba_job.Job(subject.scene, subject.c2w, subject.fov_y, options.size, subject.lights.environments)
-        write_csv(out / "mitsuba.csv", mitsuba_job.measure(options.mitsuba, job, subject.points.mask))
-        progress("mitsuba", 1, 1)
+    others = [(name, python) for name, python in (("mitsuba", options.mitsuba), ("cycles", options.cycles)) if python]
+    if others:
+        progress("other renderers", 0, 1)
+        job = renderers.Job(subject.scene, subject.c2w, subject.fov_y, options.size, subject.lights.environments)
+        made = [render for name, python in others for render in renderers.measure(name, python, job, subject.points.mask)]
+        write_csv(out / "renderers.csv", made)
+        progress("other renderers", 1, 1)
     return rows
 
 

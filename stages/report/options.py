@@ -15,3 +15,5 @@ class ReportOptions:
     """of the camera and of the measured rays; the converged result uses others"""
     mitsuba: str = ""
     """a Python interpreter that has the package mitsuba; empty for no side-by-side"""
+    cycles: str = ""
+    """a Python interpreter that has the package bpy (Blender); empty for no side-by-side"""

@@ -1,4 +1,4 @@
-"""What can be tested of the side-by-side without Mitsuba."""
+"""What can be tested of the side-by-side without the other renderers."""
 
 import sys
 from pathlib import Path
@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from stages.core.errors import InputError
-from stages.report.mitsuba_job import Job, measure, read_arrays, write_arrays
+from stages.report.renderers import NEEDS, Job, measure, read_arrays, write_arrays
 from tests.light import scenes
 
 
@@ -18,8 +18,9 @@ def test_arrays_come_back(tmp_path: Path) -> None:
     assert int(found["size"]) == 512
 
 
+@pytest.mark.parametrize("renderer", NEEDS)
 @pytest.mark.parametrize("python", ("/no/such/python", sys.executable))
-def test_an_interpreter_without_mitsuba_is_named(python: str) -> None:
+def test_an_interpreter_without_the_renderer_is_named(python: str, renderer: str) -> None:
     job = Job(scenes.sphere(0), np.eye(4), 0.5, 8, (scenes.even_light(),))
-    with pytest.raises(InputError, match="expected a Python with the package mitsuba"):
-        measure(python, job, np.ones((8, 8), bool))
+    with pytest.raises(InputError, match=r"expected a Python with the package (mitsuba|bpy)"):
+        measure(renderer, python, job, np.ones((8, 8), bool))
