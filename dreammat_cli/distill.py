@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
-from stages.distill.options import DistillOptions
+from stages.distill.options import GIVEN, DistillOptions
 
 DEFAULT = defaults(DistillOptions)
 UNIT = click.FloatRange(0)
@@ -44,6 +44,10 @@ def weight(name: str, text: str) -> Any:
 @weight("posterior", "Share of the posterior-mean term; 0 is the paper's pure classifier score.")
 @weight("anchor", "Weight of the distance between the mean material and what the words alone call for.")
 @weight("bimodal", "How strongly metallic is sent to 0 or 1 towards the end.")
+@click.option("--given", type=click.Choice(GIVEN), default=DEFAULT["given"], show_default=True,
+              help="Conditions the model gets: the paper's ablations.")
+@click.option("--lights", type=click.Choice(("all", "one")), default=DEFAULT["lights"], show_default=True,
+              help="Environments of CONDITIONS that steps are lit by; one: the first.")
 @common_options
 def command(conditions: Path, output: Path, common: Common, **chosen: Any) -> None:
     """Optimise the material of the mesh in the folder CONDITIONS until it looks like --prompt in every light.

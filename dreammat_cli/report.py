@@ -7,9 +7,9 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, reporter, show
-from stages.report.options import ReportOptions
+from stages.report.options import PriorReportOptions, ReportOptions
 
-DEFAULT = defaults(ReportOptions)
+DEFAULT, PRIOR = defaults(ReportOptions), defaults(PriorReportOptions)
 
 
 @click.group()
@@ -40,3 +40,29 @@ def conditions(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
     with reporter(common) as progress:
         rows = report_conditions(prep, output, options, progress)
     show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, summary(rows))
+
+
+@command.command()
+@click.argument("mesh", nargs=-1, metavar="[MESH]...")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write runs, CSV and pictures.")
+@click.option("--seeds", type=click.IntRange(1, 100), default=PRIOR["seeds"], show_default=True, help="Runs of every prompt.")
+@click.option("--prompts", type=click.IntRange(0), default=PRIOR["prompts"], metavar="N",
+              help="About this many of the prompts, evenly spread.  [default: all]")
+@click.option("--steps", type=click.IntRange(1), default=PRIOR["steps"], metavar="N",
+              help="Of every distillation.  [default: as `distill`]")
+@click.option("--views", type=click.IntRange(1, 9999), default=PRIOR["views"], show_default=True, help="Cameras of a mesh.")
+@common_options
+def prior(mesh: tuple[str, ...], output: Path, common: Common, **chosen: Any) -> None:
+    """Judge the embedded prior by a fixed list of prompts on MESH files, or on six shapes of its own.
+
+    A run of all prompts takes hours; stopped, the same command continues.
+    """
+    options = PriorReportOptions(mesh=mesh, **chosen)
+    if plan(common, "measure into", output, options):
+        return
+    from stages.report.prior import report_prior
+
+    with reporter(common) as progress:
+        lines = report_prior(output, options, progress)
+    table = [f"{s.measure:30} {s.group:18} {s.value:8.3f} [{s.low:.3f}, {s.high:.3f}]  {s.target} {s.met}" for s in lines]
+    show(common, {"summary": [dataclasses.asdict(line) for line in lines]}, table)

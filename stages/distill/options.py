@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+GIVEN = ("none", "geometry", "light", "full")
+
 NEGATIVE_PROMPT = "blurry, low quality, noisy, shadows, highlights, baked lighting"
 
 
@@ -24,4 +26,6 @@ class DistillOptions:
     eta2: tuple[float, float] = (0.0, 0.0)  # of the negative one, at the start and from two thirds on; paper: 1, 0.5
     posterior: float = 0.5  # share of (eps_pos - noise) added to the classifier score; 0 is the paper's
     anchor: float = 0.5  # weight of the distance between the mean material and what the words alone call for
+    given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
+    lights: str = "all"  # environments that steps are lit by: "all", or "one", the first
     bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end

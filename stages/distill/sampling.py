@@ -73,8 +73,10 @@ class Sampler(Protocol):
 class CropSampler:
     """Square crops of size S, each of a random view under a random environment."""
 
-    def __init__(self, views: Views, size: int, batch: int, device: torch.device) -> None:
+    def __init__(self, views: Views, size: int, batch: int, device: torch.device, lights: str = "all") -> None:
+        """Args: lights: "all", or "one" for the first environment alone."""
         self._views, self._size, self._batch, self._device = views, size, batch, device
+        self._lights = 1 if lights == "one" else len(views.environments)
         whole = math.ceil(max(views.width, views.height) / size)
         self._strides = [whole // 2**i for i in range(whole.bit_length())]
 
@@ -99,7 +101,7 @@ class CropSampler:
         """(view, environment) of each image: the first numbers that a step draws."""
         seen = self._views.seen
         view = torch.randint(len(seen), (self._batch,), generator=generator).tolist()
-        environment = torch.randint(len(self._views.environments), (self._batch,), generator=generator).tolist()
+        environment = torch.randint(self._lights, (self._batch,), generator=generator).tolist()
         return [(seen[v], e) for v, e in zip(view, environment, strict=True)]
 
     def _crop(self, view: int, generator: torch.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

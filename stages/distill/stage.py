@@ -114,7 +114,7 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
         if not options.prompt.strip():
             raise InputError("--prompt: empty; say what the object is made of, such as \"weathered bronze\"")
         model = load_prior(device)
-        return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device), options)
+        return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device, options.lights), options)
     raise InputError(f"--guidance {options.guidance}: unknown; expected prior or reference")
 
 

@@ -17,3 +17,19 @@ class ReportOptions:
     """a Python interpreter that has the package mitsuba; empty for no side-by-side"""
     cycles: str = ""
     """a Python interpreter that has the package bpy (Blender); empty for no side-by-side"""
+
+
+@dataclass(frozen=True)
+class PriorReportOptions:
+    """Options of the prior report."""
+
+    mesh: tuple[str, ...] = ()
+    """mesh files to work on; empty for the report's own six shapes"""
+    seeds: int = 2
+    """runs of every prompt"""
+    prompts: int = 0
+    """about this many prompts, spread over the list; 0 for all"""
+    steps: int | None = None
+    """of every distillation; None for the default"""
+    views: int = 48
+    """cameras of every mesh"""

@@ -4,7 +4,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from stages.core.artifact import written_atomically
+from stages.core.images import read_image
 
 
 def frontier(path: Path, rows: Sequence[Any], title: str) -> None:
@@ -41,3 +44,22 @@ def worst_by_setting(rows: Iterable[Any]) -> tuple[list[float], list[float]]:
         worst[row.setting] = (row.seconds, max(before, row.rmse_percent))
     kept = [pair for pair in worst.values() if pair[1] > 1e-3]
     return [seconds for seconds, _ in kept], [error for _, error in kept]
+
+
+def contact_sheet(path: Path, pictures: Sequence[tuple[str, Path]], size: int, columns: int = 9) -> None:
+    """The first view, `size` pixels wide, of each of some previews, under its prompt."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    rows = -(-len(pictures) // columns)
+    figure, panels = pyplot.subplots(rows, columns, figsize=(1.6 * columns, 1.8 * rows), layout="constrained", squeeze=False)
+    for axes in panels.flat:
+        axes.axis("off")
+    for axes, (text, preview) in zip(panels.flat, pictures, strict=False):
+        axes.imshow(np.clip(read_image(preview)[:size, :size, :3], 0, 1))
+        axes.set_title(text, fontsize=6)
+    with written_atomically(path) as temporary:
+        figure.savefig(temporary, dpi=110)
+    pyplot.close(figure)

@@ -59,6 +59,8 @@ class PriorGuidance:
         assert sample.images is not None
         images, prior = sample.images, self._prior
         exposure, conditions = self._conditions(images, sample)
+        if (given := self._options.given) != "full":
+            conditions = prior.drop(conditions, geometry=given != "geometry", light=given != "light")
         leaf = radiance.detach().requires_grad_()
         picture = prior.profile_tone(exposure * images.paint(leaf))  # (B, 3, S, S)
         score = self._score(picture.detach(), conditions, images, progress, generator)

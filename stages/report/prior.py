@@ -1,0 +1,346 @@
+"""How well the embedded prior answers prompts: a fixed evaluation through all four stages.
+
+Every prompt is distilled on one of several meshes, for several seeds, baked at 512², and held against what the words mean,
+over the texels that a view saw. A second set of runs takes conditions away from the model, as the paper's ablation does.
+Runs are kept: the same call continues where it was stopped. Written: prior.csv, a line for each run; summary.csv, a line
+for each measure with its 95 % interval and target; prior.png, a picture of each result under its prompt.
+"""
+
+import itertools
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from stages.bake.options import BakeOptions
+from stages.bake.raster import covered_samples
+from stages.bake.stage import Subject, bake, views_of
+from stages.bake.visibility import seen_points
+from stages.conditions.options import ConditionsOptions
+from stages.conditions.stage import conditions, read_lights
+from stages.core.artifact import load_npz, read_exr
+from stages.core.color import reinhard, srgb_decode, srgb_encode
+from stages.core.progress import Progress, silent
+from stages.core.schemas import MATERIAL, PREP
+from stages.core.shading import Material, Transport, shade
+from stages.distill.options import GIVEN, DistillOptions
+from stages.distill.stage import distill
+from stages.light.environment import Environment
+from stages.light.gbuffer import GBuffer
+from stages.light.lights import preview_light
+from stages.light.scene import Scene
+from stages.light.transport import Quality, light_transport
+from stages.prep.options import PrepOptions
+from stages.prep.stage import prep
+from stages.report import measures, plots
+from stages.report.conditions import write_csv
+from stages.report.options import PriorReportOptions
+from stages.report.prompts import IDENTIFIED, PROMPTS, Prompt
+from stages.report.shapes import SHAPES
+
+TEXTURE = 512
+PREVIEW = 192
+
+POINTS = 3000
+"""Seen texels at which light is traced."""
+
+RAYS = Quality(96, 32, extra=False, smooth=False)
+"""Points are loose: neighbours in memory are none on the surface."""
+
+LIFT = 1e-4
+"""Distance from the surface at which rays start, object sizes."""
+
+REGION = 0.25
+"""The upper and the lower region of a composition leave out this share of the height on either side of the middle."""
+
+TALL = 0.5
+"""Compositions are judged on meshes at least this high, in object sizes."""
+
+TURNS = (0.0, 0.33, 0.67)
+"""Turns of the relighting environment, shares of a circle: three lights that were never trained on."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One distillation. lights: "all" or "one"."""
+
+    prompt: Prompt
+    mesh: str
+    seed: int
+    given: str = "full"
+    lights: str = "all"
+
+    @property
+    def name(self) -> str:
+        """A folder's name."""
+        words = self.prompt.text.replace(" ", "_")
+        return f"{words}-{self.mesh}-{self.seed}" + ("" if self.given == "full" else f"-{self.given}") + (
+            "" if self.lights == "all" else "-one")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a run gave. Colours are sRGB; what does not apply to a run is empty.
+
+    decided: share of texels that are metal or not. light_correlation: see `measures`. identified: nearest to its own truth
+    of `prompts.IDENTIFIED`. regions: share of a composition's two regions nearer to their own material. relight_percent:
+    tone-mapped RMSE against the ideal material, under lights never trained on.
+    """
+
+    prompt: str
+    mesh: str
+    seed: int
+    given: str
+    lights: str
+    unseen: bool
+    red: float
+    green: float
+    blue: float
+    roughness: float
+    metallic: float
+    metal_right: bool
+    decided: float
+    roughness_error: float
+    color_difference: float
+    light_correlation: float
+    relight_percent: float
+    identified: str
+    regions: str
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One line of the table: a measure, its group of runs, how many, the value with its interval, and what is asked."""
+
+    measure: str
+    group: str
+    runs: int
+    value: float
+    low: float
+    high: float
+    target: str
+    met: str
+
+
+@dataclass(frozen=True)
+class Baked:
+    """Seen texels of a baked material: maps (T, 5) linear; point, n (T, 3); triangle and barycentric (T, 3)."""
+
+    maps: NDArray[np.float32]
+    point: NDArray[np.float32]
+    triangle: NDArray[np.int32]
+    barycentric: NDArray[np.float32]
+    scene: Scene
+
+
+def report_prior(out: Path, options: PriorReportOptions, progress: Progress = silent) -> list[Summary]:
+    """Run what is missing, measure, and write the report's files into a folder.
+
+    Raises: InputError, ArtifactError, OutputError, NumericalError.
+    """
+    meshes = prepared(out / "meshes", options, progress)
+    rows = []
+    runs = list(plan(options, meshes))
+    lights = list(read_lights(())[0])
+    for i, run in enumerate(runs):
+        progress(f"prior: {run.prompt.text}", i, len(runs))
+        rows.append(measure(run, carry_out(run, out, options), lights))
+        write_csv(out / "prior.csv", rows)
+    progress("prior", len(runs), len(runs))
+    summary = list(summarise(rows))
+    write_csv(out / "summary.csv", summary)
+    shown = [run for run in runs if (run.seed, run.given, run.lights) == (0, "full", "all")]
+    plots.contact_sheet(
+        out / "prior.png",
+        [(run.prompt.text, out / "runs" / run.name / "asset" / "preview.png") for run in shown],
+        PREVIEW,
+    )
+    return summary
+
+
+def prepared(folder: Path, options: PriorReportOptions, progress: Progress) -> dict[str, float]:
+    """Prepare the meshes and make their conditions. Returns: the height of each, by name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if options.mesh:
+        files = {Path(mesh).stem: Path(mesh) for mesh in options.mesh}
+    else:
+        files = {name: folder / f"{name}.obj" for name in SHAPES}
+        for name, make in SHAPES.items():
+            make().export(files[name])
+    heights = {}
+    for name, path in files.items():
+        ready, up = folder / name / "prep.npz", "y" if options.mesh else "z"
+        ready.parent.mkdir(exist_ok=True)
+        prep(path, ready, PrepOptions(up=up, texture_size=TEXTURE, padding=4))
+        asked = ConditionsOptions(views=options.views, quality="draft")
+        conditions(ready, folder / name / "conditions", asked, progress=progress)
+        heights[name] = float(np.ptp(load_npz(ready, PREP)["vertices"][:, 2]))
+    return heights
+
+
+def plan(options: PriorReportOptions, meshes: dict[str, float]) -> Iterable[Run]:
+    """All runs: prompts in turn over the meshes, then the ladder of conditions for the prompts to identify."""
+    chosen = PROMPTS if options.prompts == 0 else PROMPTS[:: max(1, len(PROMPTS) // options.prompts)]
+    every, tall = itertools.cycle(meshes), itertools.cycle([m for m, height in meshes.items() if height >= TALL] or meshes)
+    placed = [(prompt, next(tall if prompt.top else every)) for prompt in chosen]
+    for seed in range(options.seeds):
+        yield from (Run(prompt, mesh, seed) for prompt, mesh in placed)
+    ladder = [(prompt, mesh) for prompt, mesh in placed if prompt in IDENTIFIED]
+    for seed in range(options.seeds):
+        for prompt, mesh in ladder:
+            yield from (Run(prompt, mesh, seed, given) for given in GIVEN if given != "full")
+            yield Run(prompt, mesh, seed, lights="one")
+
+
+def carry_out(run: Run, out: Path, options: PriorReportOptions) -> Baked:
+    """Distill and bake a run, unless that is there, and read its seen texels."""
+    folder, source = out / "runs" / run.name, out / "meshes" / run.mesh
+    folder.mkdir(parents=True, exist_ok=True)
+    asked = DistillOptions(prompt=run.prompt.text, seed=run.seed, steps=options.steps, given=run.given, lights=run.lights)
+    distill(source / "conditions", folder / "material.npz", asked)
+    bake(source / "prep.npz", folder / "material.npz", folder / "asset", BakeOptions(TEXTURE, 1, PREVIEW))
+    made, mesh = load_npz(folder / "material.npz", MATERIAL), load_npz(source / "prep.npz", PREP)
+    subject = Subject.of(source / "prep.npz", mesh, TEXTURE)
+    surface = covered_samples(subject.layout, 1, range(TEXTURE))
+    on_chart = surface.triangle >= 0
+    seen = seen_points(subject.scene, surface.where(on_chart), views_of(made), subject.open)
+    points = surface.where(on_chart)[np.flatnonzero(seen)]
+    maps = np.concatenate([_channels(folder / "asset" / f"{name}.exr") for name in ("albedo", "roughness", "metallic")], -1)
+    weights = np.c_[points.barycentric, 1 - points.barycentric.sum(1)]
+    point = subject.scene.point(points.triangle, weights)
+    return Baked(maps[on_chart][seen], point, points.triangle, weights.astype(np.float32), subject.scene)
+
+
+def _channels(path: Path) -> NDArray[np.float32]:
+    """(H, W, C) of an EXR, colours in the order R, G, B."""
+    found = read_exr(path).channels
+    return np.stack([found[c] for c in ("RGB" if len(found) > 1 else found)], -1).astype(np.float32)
+
+
+def measure(run: Run, baked: Baked, lights: list[Environment]) -> Row:
+    """Everything of one run."""
+    wanted, maps = run.prompt.meaning.row(), baked.maps
+    colors = srgb_encode(maps[:, :3])
+    found = np.r_[colors.mean(0), maps[:, 3:].mean(0)]
+    if run.prompt.top is not None:  # on the whole it is half of each
+        wanted = (wanted + run.prompt.top.row()) / 2
+    correlation, relit = float("nan"), float("nan")
+    if run.prompt.top is None:
+        rows = np.sort(np.random.default_rng(0).choice(len(maps), min(POINTS, len(maps)), replace=False))
+        points = loose_points(baked, rows)
+        irradiance = sum(t.E for t in light_transport(baked.scene, points, lights, RAYS, 0))
+        correlation = measures.light_correlation(maps[rows, :3], irradiance.numpy())  # type: ignore[union-attr]
+        relit = relight(baked, points, maps[rows], wanted)
+    truths = np.stack([p.meaning.row() for p in IDENTIFIED])
+    own = run.prompt in IDENTIFIED and IDENTIFIED[measures.nearest(found, truths)] == run.prompt
+    red, green, blue, roughness, metallic = found.tolist()
+    return Row(
+        prompt=run.prompt.text,
+        mesh=run.mesh,
+        seed=run.seed,
+        given=run.given,
+        lights=run.lights,
+        unseen=run.prompt.unseen,
+        red=red,
+        green=green,
+        blue=blue,
+        roughness=roughness,
+        metallic=metallic,
+        metal_right=bool((found[4] > 0.5) == (wanted[4] > 0.5)),
+        decided=measures.decided(maps[:, 4]),
+        roughness_error=abs(float(found[3] - wanted[3])),
+        color_difference=measures.color_difference(found[:3], wanted[:3]),
+        light_correlation=correlation,
+        relight_percent=relit,
+        identified=str(own) if run.prompt in IDENTIFIED else "",
+        regions="" if run.prompt.top is None else f"{regions_right(run.prompt, baked, colors):.2f}",
+    )
+
+
+def regions_right(prompt: Prompt, baked: Baked, colors: NDArray) -> float:
+    """Share of the two regions, top and base, whose mean is nearer to its own material than to the other's."""
+    assert prompt.top is not None
+    truths = np.stack([prompt.meaning.row(), prompt.top.row()])
+    z = baked.point[:, 2]
+    middle, height = (z.max() + z.min()) / 2, np.ptp(z)
+    values = np.c_[colors, baked.maps[:, 3:]]
+    right = 0
+    for own, inside in enumerate((z < middle - REGION * height / 2, z > middle + REGION * height / 2)):
+        right += bool(inside.any()) and measures.nearest(values[inside].mean(0), truths) == own
+    return right / 2
+
+
+def loose_points(baked: Baked, rows: NDArray[np.int64]) -> GBuffer:
+    """Texels as points that are looked at from straight above."""
+    triangle, weights, scene = baked.triangle[rows], baked.barycentric[rows], baked.scene
+    ng = scene.geometric_normal(triangle).astype(np.float32)
+    n = scene.shading_normal(triangle, weights).astype(np.float32)
+    point = baked.point[rows].astype(np.float32)
+    mask, depth = np.ones((1, len(rows)), bool), np.ones((1, len(rows)), np.float32)
+    return GBuffer(mask, depth, point, point + LIFT * ng, n, ng, n, triangle, weights)
+
+
+def relight(baked: Baked, points: GBuffer, maps: NDArray[np.float32], wanted: NDArray) -> float:
+    """Tone-mapped RMSE, percent, of the points' pictures against those of the ideal, even material."""
+    light = preview_light()
+    turned = [Environment(f"{light.name}_{i}", np.roll(light.radiance, int(turn * light.radiance.shape[1]), 1))
+              for i, turn in enumerate(TURNS)]  # fmt: skip
+    found = torch.from_numpy(maps)
+    ideal = torch.tensor([*srgb_decode(wanted[:3]).tolist(), *wanted[3:].tolist()]).float().expand(len(maps), 5)
+    squares = []
+    for transport in light_transport(baked.scene, points, turned, RAYS, 0):
+        a, b = (reinhard(shade(_float(transport), _material(values))) for values in (found, ideal))
+        squares.append(float((a - b).square().mean()))
+    return float(np.sqrt(np.mean(squares))) * 100
+
+
+def _float(transport: Transport) -> Transport:
+    return transport.to(torch.float32)
+
+
+def _material(values: torch.Tensor) -> Material:
+    return Material(values[:, :3].contiguous(), values[:, 3].contiguous(), values[:, 4].contiguous())
+
+
+def summarise(rows: list[Row]) -> Iterable[Summary]:
+    """The table."""
+    full = [row for row in rows if (row.given, row.lights) == ("full", "all")]
+    one = [row for row in full if not row.regions]
+    taught, unseen = ([row for row in one if row.unseen == kind] for kind in (False, True))
+
+    def line(measure: str, group: str, values: list[float], target: str, median: bool = False) -> Summary:
+        value, low, high = measures.interval(values, np.median if median else np.mean)
+        met = ""
+        if target and len(values):
+            bound = float(target.split()[1])
+            met = str(value >= bound if target.startswith(">=") else value <= bound)
+        return Summary(measure, group, len(values), value, low, high, target, met)
+
+    yield line("metal or not, %", "one material", [100.0 * r.metal_right for r in one], ">= 97")
+    yield line("metal or not, %", "unseen words", [100.0 * r.metal_right for r in unseen], ">= 90")
+    yield line("texels decided, %", "one material", [100 * r.decided for r in one], ">= 90")
+    yield line("roughness error", "one material", [r.roughness_error for r in one], "<= 0.12")
+    yield line("CIEDE2000, median", "taught words", [r.color_difference for r in taught], "<= 8", median=True)
+    yield line("CIEDE2000, median", "unseen words", [r.color_difference for r in unseen], "<= 14", median=True)
+    yield line("regions right, %", "two materials", [100 * float(r.regions) for r in full if r.regions], ">= 85")
+    yield line("identified, %", "ten prompts", [100.0 * (r.identified == "True") for r in full if r.identified], ">= 85")
+    yield line("relight RMSE, %", "one material", [r.relight_percent for r in one], "")
+    known = {row.prompt for row in rows if row.given != "full"}
+    for label, given, lights in (("a none", "none", "all"), ("b geometry", "geometry", "all"), ("c light", "light", "all"),
+                                 ("d full, one light", "full", "one"), ("e full", "full", "all")):  # fmt: skip
+        of = [abs(r.light_correlation) for r in rows if (r.given, r.lights) == (given, lights) and r.prompt in known]
+        yield line("baked light, |correlation|", label, of, "<= 0.10" if label.startswith("e") else "")
+    yield line("baked light, |correlation|", "one material", [abs(r.light_correlation) for r in one], "<= 0.10")
+    yield line("two seeds, distance of means", "all", distances(full), "")
+
+
+def distances(rows: list[Row]) -> list[float]:
+    """How far apart the mean materials of two seeds of a prompt are: Euclidean, sRGB albedo, roughness, metallic."""
+    means: dict[tuple[str, str], list[NDArray]] = {}
+    for row in rows:
+        mean = np.array([row.red, row.green, row.blue, row.roughness, row.metallic])
+        means.setdefault((row.prompt, row.mesh), []).append(mean)
+    return [float(np.linalg.norm(m[0] - m[1])) for m in means.values() if len(m) > 1]
