@@ -67,7 +67,7 @@ SUMMED = np.array([j for j in range(STORED) if j not in MIRROR])
 class Quality:
     """How many rays a point traces: `lobe` for the mixture of lobes, `light` for the excess of an average environment.
 
-    The noisiest points trace more, see EXTRA_RAYS, and what noise is left is smoothed, unless switched off.
+    The noisiest points trace more, see EXTRA, and what noise is left is smoothed, unless switched off.
     """
 
     lobe: int
@@ -80,8 +80,8 @@ class Quality:
         return replace(self, lobe=max(2, round(self.lobe * factor)), light=max(2, round(self.light * factor)))
 
 
-EXTRA_SHARE, EXTRA_RAYS = 0.15, 3.5
-"""Share of the points that trace more, and how many times the rays of the others."""
+EXTRA = ((0.1, 3.0), (0.012, 12.0))
+"""Rounds of further rays: for which share of the points, the noisiest by then, and how many times what all began with."""
 
 SEED_STEP = 0x5EED
 """Between the seed of a point's rays and that of its further ones."""
@@ -100,10 +100,14 @@ AIM = np.array([alpha_from_roughness(r) for r in (0.5, 1.0)], np.float32)
 
 @dataclass(frozen=True)
 class Sums:
-    """What a point gathers, for all environments: (P, STORED, CHANNELS) float32, and the variance of each."""
+    """What a point gathers, for all environments: (P, STORED, CHANNELS) float32, and the variance of each.
+
+    rays: (P,) float32, traced for a point, as a multiple of what every point begins with.
+    """
 
     mean: NDArray[np.float32]
     variance: NDArray[np.float32]
+    rays: NDArray[np.float32]
 
 
 def light_transport(
@@ -138,10 +142,10 @@ def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality,
     """`light_transport` for lights that are already split."""
     near = reconstruction.Neighbours.of(points)
     sums = trace(scene, points, lights, quality, seed)
-    if quality.extra:
+    for i, (share, factor) in enumerate(EXTRA if quality.extra else (), 1):
         judged = sums.mean[:, JUDGED], sums.variance[:, JUDGED]
-        worst = reconstruction.noisiest(*judged, near, int(EXTRA_SHARE * len(points.n)))
-        add(sums, worst, trace(scene, points[worst], lights, quality.scaled(EXTRA_RAYS), seed + SEED_STEP), EXTRA_RAYS)
+        worst = reconstruction.noisiest(*judged, near, int(share * len(points.n)))
+        add(sums, worst, trace(scene, points[worst], lights, quality.scaled(factor), seed + i * SEED_STEP), factor)
     mean = sums.mean
     if quality.smooth:
         sums.variance[:, SHARP] = 0
@@ -156,10 +160,11 @@ def _transport(sums: NDArray, cosine: torch.Tensor) -> Transport:
 
 
 def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
-    """Average further rays into some points, in place; `more` stands for `factor` times the rays of `sums`."""
-    old, new = 1 / (1 + factor), factor / (1 + factor)
-    sums.mean[rows] = old * sums.mean[rows] + new * more.mean
-    sums.variance[rows] = old**2 * sums.variance[rows] + new**2 * more.variance
+    """Average further rays into some points, in place; `more` holds `factor` times the rays that any point began with."""
+    new = (factor / (sums.rays[rows] + factor))[:, None, None]
+    sums.mean[rows] += new * (more.mean - sums.mean[rows])
+    sums.variance[rows] = (1 - new) ** 2 * sums.variance[rows] + new**2 * more.variance
+    sums.rays[rows] += factor
 
 
 def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> Sums:
@@ -170,7 +175,8 @@ def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, see
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
         list(pool.map(lambda part: _tile(scene, points, lights, rays, pixel[part], part, mean, gap), parts))
-    return Sums(mean, reconstruction.variance(gap, reconstruction.Neighbours.of(points)))
+    variance = reconstruction.variance(gap, reconstruction.Neighbours.of(points))
+    return Sums(mean, variance, np.ones(len(mean), np.float32))
 
 
 def _tile(
