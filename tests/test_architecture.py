@@ -16,7 +16,7 @@ ALLOWED = {
     "distill": {"core", "light", "prior"},
     "bake": {"core", "light", "prior"},
     "train": {"core", "light", "prior", "prep", "conditions", "distill", "bake"},
-    "report": {"core", "light", "prior", "prep", "conditions", "distill", "bake"},
+    "report": {"core", "light", "prior", "prep", "conditions", "distill", "bake", "train"},
 }
 
 SOURCES = sorted(path for package in ("stages", "dreammat_cli") for path in (ROOT / package).rglob("*.py"))

@@ -70,14 +70,14 @@ def _two(base: str, top: str) -> Prompt:
 IDENTIFIED = (
     _seen("gold", "gold"), _seen("oak wood", "oak"), _seen("white marble", "marble"), _seen("rust", "rust"),
     _seen("black rubber", "black rubber"), _seen("red plastic", "plastic", "red"), _seen("concrete", "concrete"),
-    _seen("copper", "copper"), _seen("blue glazed ceramic", "ceramic", "blue"), _seen("green moss", "moss"),
+    _seen("chrome", "chrome"), _seen("blue glazed ceramic", "ceramic", "blue"), _seen("green moss", "moss"),
 )
 """Ten prompts far apart: each result must lie nearest to its own truth among them."""
 
 PROMPTS = (
     *IDENTIFIED,
     _seen("silver", "silver"), _seen("brass", "brass"), _seen("cast bronze", "bronze"), _seen("wrought iron", "iron"),
-    _seen("stainless steel", "steel"), _seen("chrome", "chrome"), _seen("titanium", "titanium"),
+    _seen("stainless steel", "steel"), _seen("copper", "copper"), _seen("titanium", "titanium"),
     _seen("aluminium", "aluminium"), _seen("polished brass", "brass", finish="polished"),
     _seen("brushed steel", "steel", finish="brushed"), _seen("walnut wood", "walnut"), _seen("pine wood", "pine"),
     _seen("bamboo", "bamboo"), _seen("granite", "granite"), _seen("sandstone", "sandstone"), _seen("red brick", "brick"),
@@ -94,7 +94,7 @@ PROMPTS = (
     _new("nylon fabric", "#b8b4ac", 0.7), _new("tweed", "#8a7d6a", 0.92), _new("travertine", "#d2c4a8", 0.6),
     _new("quartzite", "#bcb6b0", 0.6), _new("stoneware pottery", "#a48f76", 0.5), _new("corroded iron", "#7a4528", 0.85),
     _new("cobblestone", "#807c76", 0.85), _new("soapstone", "#6c706c", 0.5), _new("neoprene", "#26282a", 0.75),
-    _new("electrum", "#f2e0a4", 0.27, 1.0), _new("metallic silver", "#fcfaf5", 0.27, 1.0),
+    _new("electrum", "#f2e0a4", 0.27, 1.0), _new("palladium", "#d9d6d1", 0.25, 1.0),
     _new("vermilion paint", "#e34234", 0.35), _new("cerulean ceramic", "#2a6bb0", 0.15),
     _new("chartreuse plastic", "#9fdc14", 0.33), _new("ultramarine paint", "#2a20a0", 0.35),
     _new("mauve fabric", "#c0a0cc", 0.89),

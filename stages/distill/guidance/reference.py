@@ -31,7 +31,7 @@ from stages.light.scene import Scene
 PIXELS = 1024
 """Pixels a step for each image of the batch: many small steps get further in a given time than few large ones."""
 
-BUDGET = Budget(steps=8000, learning_rate=0.02)
+BUDGET = Budget(steps=10_000, learning_rate=0.02)
 
 REACH = 5e-3
 """The reference's surface is looked for this far before and behind a seen point, world units."""
