@@ -197,7 +197,7 @@ def interpolate(
     x = (roughness[:, None] - r[:, 1:2]) / h
     ease, tail = x * x * (3 - 2 * x), x * x * (x - 1)
     spline = y[:, 1] * (1 - ease) + y[:, 2] * ease + h * (slope_left * x * (1 - x) ** 2 + slope_right * tail)
-    relative = torch.exp(spline) - dark
+    relative = (torch.exp(spline) - dark).clamp(min=0)  # beside a steep fall the spline dips under black
     albedo = specular_albedo(roughness, transport.cosine.to(roughness.dtype)).clamp(min=LEAST_ALBEDO)
     A, B = (relative * albedo.repeat_interleave(3, -1)).split(3, -1)
     return A, B

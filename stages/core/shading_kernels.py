@@ -134,10 +134,11 @@ def _shade(  # type: ignore[no-untyped-def]
                 a = _slope(rise0, rise1, step[0], h)
                 b = _slope(rise1, rise2, h, step[2])
                 raised = np.exp(y[1] * (one - ease) + y[2] * ease + h * (a * head + b * tail))
-                relative = raised - least_y
+                relative = max(raised - least_y, np.float32(0))
                 change = rise1 * 6 * x * (one - x) + a * (one - x) * (one - 3 * x) + b * x * (3 * x - 2)
                 value[term] = relative * open_point[term]
-                slope[term] = raised * change * open_point[term] + relative * by_r[term]
+                change = raised * change if relative > 0 else np.float32(0)
+                slope[term] = change * open_point[term] + relative * by_r[term]
             diffuse, f = (one - m) * c[p, j], f0 * (one - m) + m * c[p, j]
             out[i, j] = diffuse * E[i, j] + f * value[0] + value[1]
             out_a[i, j] = value[0]

@@ -67,11 +67,7 @@ def variance(gap: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
 
 def smoothed(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
     """The sums, (P, ...), with the noise of variance `noise` averaged away."""
-    flat, noise = (a.reshape(len(mean), int(np.prod(mean.shape[1:]))) for a in (mean, noise))
-    result = np.empty_like(flat)
-    geometry = (near.index, near.pixel, near.n, near.point)
-    _in_parts(lambda start, end: _smoothed(flat, noise, *geometry, start, end, result), len(mean), POINTS_PER_TASK)
-    return result.reshape(mean.shape)
+    return _weighted(mean, noise, near, 1).reshape(mean.shape)
 
 
 def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, count: int) -> NDArray[np.int64]:
@@ -81,11 +77,18 @@ def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighb
     """
     if count == 0:
         return np.zeros(0, np.int64)
-    flat, noise = (np.ascontiguousarray(a.reshape(len(mean), int(np.prod(mean.shape[1:])))) for a in (mean, noise))
-    score = np.empty(len(mean), np.float32)
+    left = _weighted(mean, noise, near, 2) / (1 + mean.reshape(len(mean), -1).clip(0)) ** 4
+    return np.sort(np.argpartition(-left.sum(1), count - 1)[:count])
+
+
+def _weighted(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, power: int) -> NDArray[np.float32]:
+    """Over each point's neighbours, (P, values): the weighted mean of the sums, power 1, or that mean's variance, power 2."""
+    width = int(np.prod(mean.shape[1:]))
+    flat, noise = (np.ascontiguousarray(a.reshape(len(mean), width)) for a in (mean, noise))
+    values, result = flat if power == 1 else noise, np.empty_like(flat)
     geometry = (near.index, near.pixel, near.n, near.point)
-    _in_parts(lambda start, end: _score(flat, noise, *geometry, start, end, score), len(mean), POINTS_PER_TASK)
-    return np.sort(np.argpartition(-score, count - 1)[:count])
+    _in_parts(lambda a, b: _average(flat, noise, values, power, *geometry, a, b, result), len(mean), POINTS_PER_TASK)
+    return result
 
 
 def _in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
@@ -146,14 +149,15 @@ def _alike(mean, noise, p, q, k):  # type: ignore[no-untyped-def]
 
 
 @fast
-def _smoothed(mean, noise, index, pixel, n, point, start, end, result):  # type: ignore[no-untyped-def]
+def _average(mean, noise, values, power, index, pixel, n, point, start, end, result):  # type: ignore[no-untyped-def]
+    """Sum of w^power values over the sum of w, to that power."""
     f32 = np.float32
     height, width = index.shape
     size = mean.shape[1]
     total, weight = np.empty(size, np.float32), np.empty(size, np.float32)
     for p in range(start, end):
         x, y = pixel[p]
-        total[:] = mean[p]
+        total[:] = values[p]
         weight[:] = 1
         for j in range(max(y - RADIUS, 0), min(y + RADIUS, height - 1) + 1):
             for i in range(max(x - RADIUS, 0), min(x + RADIUS, width - 1) + 1):
@@ -166,37 +170,6 @@ def _smoothed(mean, noise, index, pixel, n, point, start, end, result):  # type:
                 for k in range(size):
                     w = same * _alike(mean, noise, p, q, k)
                     weight[k] += w
-                    total[k] += w * mean[q, k]
+                    total[k] += (w if power == 1 else w * w) * values[q, k]
         for k in range(size):
-            result[p, k] = total[k] / weight[k]
-
-
-@fast
-def _score(mean, noise, index, pixel, n, point, start, end, result):  # type: ignore[no-untyped-def]
-    """The variance that `_smoothed` leaves, summed over the tone-mapped sums."""
-    f32 = np.float32
-    height, width = index.shape
-    size = mean.shape[1]
-    total, weight = np.empty(size, np.float32), np.empty(size, np.float32)
-    for p in range(start, end):
-        x, y = pixel[p]
-        total[:] = noise[p]
-        weight[:] = 1
-        for j in range(max(y - RADIUS, 0), min(y + RADIUS, height - 1) + 1):
-            for i in range(max(x - RADIUS, 0), min(x + RADIUS, width - 1) + 1):
-                q = index[j, i]
-                if q < 0 or q == p:
-                    continue
-                same = _same(n, point, p, q)
-                if same <= f32(0):
-                    continue
-                for k in range(size):
-                    w = same * _alike(mean, noise, p, q, k)
-                    weight[k] += w
-                    total[k] += w * w * noise[q, k]
-        left = f32(0)
-        for k in range(size):
-            slope = f32(1) / (f32(1) + max(mean[p, k], f32(0)))
-            slope *= slope / weight[k]
-            left += total[k] * slope * slope
-        result[p] = left
+            result[p, k] = total[k] / (weight[k] if power == 1 else weight[k] * weight[k])

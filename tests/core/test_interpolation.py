@@ -67,6 +67,17 @@ def test_interpolation_stays_near_its_knots() -> None:
         assert bool((relative <= 1.5 * high).all())
 
 
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_no_negative_light_beside_a_steep_fall(dtype: torch.dtype) -> None:
+    """Compiled (float32) and plain (float64): one lamp in the mirror, black beside it, some light for the roughest lobe."""
+    A = torch.zeros(61, len(KNOTS), 3, dtype=dtype)
+    A[:, 3], A[:, -1] = 1000.0, 1.0
+    dark = torch.zeros(61, 3, dtype=dtype)
+    t = Transport(dark, A, torch.zeros_like(A), torch.full((61,), 0.7, dtype=dtype))
+    roughness = torch.linspace(0, 1, 61, dtype=dtype)
+    assert float(shade(t, Material(dark + 1, roughness, torch.ones(61, dtype=dtype))).min()) >= 0
+
+
 def test_gradients_of_all_inputs() -> None:
     t = random_transport(6)
     inputs = [random(*shape).mul(0.9).add(0.05).requires_grad_() for shape in ((6, 3), (6,), (6,))]

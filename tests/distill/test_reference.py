@@ -12,7 +12,7 @@ from stages.core.color import srgb_decode
 from stages.core.errors import InputError
 from stages.core.shading import Material, shade
 from stages.distill.guidance.reference import ReferenceAsset, ReferenceGuidance, bilinear
-from stages.distill.sampling import PixelSampler
+from stages.distill.sampling import PixelSampler, Sample
 from stages.distill.views import Views
 from tests.distill.examples import RADIUS, painted_sphere, write_conditions
 
@@ -83,14 +83,19 @@ def test_to_world_is_applied(conditions: Path, tmp_path: Path) -> None:
         ReferenceGuidance(ReferenceAsset(path, IDENTITY), seen)
 
 
-def test_gradient_vanishes_at_the_truth_and_points_to_it(conditions: Path, tmp_path: Path) -> None:
-    asset, seen = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY), pool(conditions)
-    guidance = ReferenceGuidance(asset, seen)
-    generator = torch.Generator().manual_seed(1)
+def at_the_truth(conditions: Path, folder: Path, generator: torch.Generator) -> tuple[ReferenceGuidance, Sample, torch.Tensor]:
+    """A guidance, a sample of it, and what that shows with the true material."""
+    asset, seen = ReferenceAsset(painted_sphere(folder / "sphere.glb"), IDENTITY), pool(conditions)
     sample = seen.draw(generator)
     assert sample.rows is not None
     truth = torch.from_numpy(asset.material_at(seen.points.numpy(), seen.eyes.numpy())[0])[sample.rows]
     radiance = shade(sample.transport, Material(truth[:, :3].contiguous(), truth[:, 3], truth[:, 4]))
+    return ReferenceGuidance(asset, seen), sample, radiance
+
+
+def test_gradient_vanishes_at_the_truth_and_points_to_it(conditions: Path, tmp_path: Path) -> None:
+    generator = torch.Generator().manual_seed(1)
+    guidance, sample, radiance = at_the_truth(conditions, tmp_path, generator)
     response = guidance.respond(radiance, sample, 0.0, generator)
     assert response.loss < 1e-5 and float(response.gradient.abs().sum()) < 1e-4
     for factor, sign in ((1.02, 1), (0.98, -1)):
@@ -99,13 +104,8 @@ def test_gradient_vanishes_at_the_truth_and_points_to_it(conditions: Path, tmp_p
 
 
 def test_curvature_is_the_gradients_slope_for_small_residuals(conditions: Path, tmp_path: Path) -> None:
-    asset, seen = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY), pool(conditions)
-    guidance = ReferenceGuidance(asset, seen)
     generator = torch.Generator().manual_seed(1)
-    sample = seen.draw(generator)
-    assert sample.rows is not None
-    truth = torch.from_numpy(asset.material_at(seen.points.numpy(), seen.eyes.numpy())[0])[sample.rows]
-    radiance = shade(sample.transport, Material(truth[:, :3].contiguous(), truth[:, 3], truth[:, 4]))
+    guidance, sample, radiance = at_the_truth(conditions, tmp_path, generator)
     step = 0.003 * radiance
     up, down = (guidance.respond(radiance + sign * step, sample, 0.0, generator) for sign in (1, -1))
     assert up.curvature is not None
