@@ -89,7 +89,7 @@ SEED_STEP = 0x5EED
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
 
-QUALITY = {"draft": Quality(18, 10), "standard": Quality(36, 22), "high": Quality(200, 120)}
+QUALITY = {"draft": Quality(20, 8), "standard": Quality(44, 18), "high": Quality(240, 100)}
 
 LOBE_SHARES = np.array([0.22, 0.03, 0.05, 0.08, 0.11, 0.14, 0.14, 0.12, 0.11])
 """Share of the lobe rays: the cosine lobe, then each knot but the mirror."""

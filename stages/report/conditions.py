@@ -50,7 +50,7 @@ WINDOWED = 8.0
 WINDOW = 0.05
 """Share of the object's pixels in that window."""
 
-SAMPLE = 3000
+SAMPLE = 8000
 """Object pixels at which errors are taken."""
 
 CONVERGED = Quality(6144, 3072, extra=False, smooth=False)
