@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
-from stages.distill.options import GIVEN, DistillOptions
+from stages.distill.options import GIVEN, LOSSES, DistillOptions
 
 DEFAULT = defaults(DistillOptions)
 UNIT = click.FloatRange(0)
@@ -38,10 +38,12 @@ def weight(name: str, text: str) -> Any:
               help="Same seed, same result.")
 @click.option("--device", default=DEFAULT["device"], show_default=True, help="A torch device: cpu, cuda, mps.")
 @weight("smoothness", "Weight of the difference between neighbouring points' materials.")
-@weight("eta1", "Weight of the positive prediction (paper, Eq. 7).")
+@click.option("--loss", type=click.Choice(LOSSES), default=DEFAULT["loss"], show_default=True,
+              help="Classifier score distillation, with weights that suit the model, or DreamFusion's.")
+@weight("eta1", "Weight of the positive prediction (paper, Eq. 7), in place of the loss's own.")
 @click.option("--eta2", type=(UNIT, UNIT), default=DEFAULT["eta2"], show_default=True, metavar="START END",
-              help="Of the negative one, at the first step and from two thirds of the steps on.")
-@weight("posterior", "Share of the posterior-mean term; 0 is the paper's pure classifier score.")
+              help="Of the negative one, at the first step and from two thirds of the steps on; likewise.")
+@weight("posterior", "Share of the posterior-mean term, 0 in the paper's pure classifier score; likewise.")
 @weight("anchor", "Weight of the distance between the mean material and what the words alone call for.")
 @weight("bimodal", "How strongly metallic is sent to 0 or 1 towards the end.")
 @click.option("--given", type=click.Choice(GIVEN), default=DEFAULT["given"], show_default=True,

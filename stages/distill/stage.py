@@ -107,15 +107,15 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
         chosen = step_generator(options.seed, POOL)
         pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device)
         return reference.ReferenceGuidance(asset, pool)
-    if options.guidance == "prior":
-        from stages.distill.guidance import prior
-        from stages.prior.model import load_prior
+    if options.guidance != "prior":
+        raise InputError(f"--guidance {options.guidance}: unknown; expected prior or reference")
+    if not options.prompt.strip():
+        raise InputError("--prompt: empty; say what the object is made of, such as \"weathered bronze\"")
+    from stages.distill.guidance import prior
+    from stages.prior.model import load_prior
 
-        if not options.prompt.strip():
-            raise InputError("--prompt: empty; say what the object is made of, such as \"weathered bronze\"")
-        model = load_prior(device)
-        return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device, options.lights), options)
-    raise InputError(f"--guidance {options.guidance}: unknown; expected prior or reference")
+    model = load_prior(device)
+    return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device, options.lights), options)
 
 
 def new_state(options: DistillOptions, views: Views, device: torch.device, start: Tensor | None) -> State:
@@ -249,6 +249,8 @@ def _device(options: DistillOptions) -> torch.device:
 
 def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Guidance) -> Provenance:
     chosen = plain_options(options) | dataclasses.asdict(budget)
+    if guidance.weights:
+        chosen |= plain_options(guidance.weights)
     chosen["reference"] = options.reference.name if options.reference else None
     inputs = {"conditions": views.digest, "prep": views.prep, **guidance.inputs}
     extra = {"prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments}
