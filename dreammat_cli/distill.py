@@ -7,8 +7,9 @@ import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
 from stages.distill.options import GIVEN, LOSSES, DistillOptions
+from stages.sd.options import MEMORY, SdOptions
 
-DEFAULT = defaults(DistillOptions)
+DEFAULT, SD = defaults(DistillOptions), defaults(SdOptions)
 UNIT = click.FloatRange(0)
 
 
@@ -24,10 +25,16 @@ def weight(name: str, text: str) -> Any:
 @click.option("--prompt", default=DEFAULT["prompt"], metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
 @click.option("--negative-prompt", default=DEFAULT["negative_prompt"], show_default=True, metavar="TEXT",
               help="What the picture should not look like.")
-@click.option("--guidance", type=click.Choice(["prior", "reference"]), default=DEFAULT["guidance"], show_default=True,
-              help="The embedded diffusion model, or the known material of --reference.")
+@click.option("--guidance", type=click.Choice(["prior", "sd", "reference"]), default=DEFAULT["guidance"], show_default=True,
+              help="The embedded diffusion model, Stable Diffusion, or the known material of --reference.")
 @click.option("--reference", type=INPUT, default=DEFAULT["reference"], metavar="MODEL.glb",
               help="A textured model of the same shape, for --guidance reference.")
+@click.option("--sd-model", default=SD["sd_model"], metavar="FOLDER|ID",
+              help="Stable Diffusion, for --guidance sd: a folder in the layout of diffusers, or an id of the hub.")
+@click.option("--controlnet", default=SD["controlnet"], metavar="FOLDER|ID",
+              help="Its light and geometry ControlNet, likewise.")
+@click.option("--vram", type=click.Choice([str(n) for n in MEMORY]), default=SD["vram"], metavar="GIB",
+              help="For --guidance sd: GPU memory to stay within, 8, 12, 16 or 24; otherwise what the GPU has.")
 @click.option("--steps", type=click.IntRange(1), default=DEFAULT["steps"], show_default=True, metavar="N",
               help="Optimiser steps.")
 @click.option("--batch", type=click.IntRange(1, 256), default=DEFAULT["batch"], show_default=True, metavar="N",
@@ -56,7 +63,9 @@ def command(conditions: Path, output: Path, common: Common, **chosen: Any) -> No
 
     Stopped by Ctrl-C or a kill, the same command continues; on a CPU the result has the same bytes either way.
     """
-    options = DistillOptions(**chosen)
+    vram = chosen.pop("vram")
+    sd = SdOptions(chosen.pop("sd_model"), chosen.pop("controlnet"), vram and int(vram))
+    options = DistillOptions(**chosen, sd=sd)
     if plan(common, "distill", output, options):
         return
     from stages.distill.stage import distill

@@ -1,7 +1,9 @@
 """What distillation can be asked for. Symbols are those of the paper (Zhang et al. 2024, DreamMat)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+
+from stages.sd.options import SdOptions
 
 GIVEN = ("none", "geometry", "light", "full")
 LOSSES = ("csd", "sds")
@@ -13,7 +15,7 @@ NEGATIVE_PROMPT = "blurry, low quality, noisy, shadows, highlights, baked lighti
 class DistillOptions:
     """Options of `stages.distill.stage.distill`; `--guidance reference` uses those marked * and nothing below them."""
 
-    guidance: str = "prior"  # * "prior": the embedded diffusion model; "reference": a known material
+    guidance: str = "prior"  # * "prior": the embedded diffusion model; "sd": Stable Diffusion; "reference": a known material
     reference: Path | None = None  # * glTF binary or other textured scene, for the reference guidance
     steps: int | None = None  # * optimiser steps; None: what the guidance calls for
     batch: int = 1  # * images a step, or that many times PIXELS for the reference
@@ -30,4 +32,5 @@ class DistillOptions:
     anchor: float = 0.5  # weight of the distance between the mean material and what the words alone call for
     given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
     lights: str = "all"  # environments that steps are lit by: "all", or "one", the first
+    sd: SdOptions = field(default_factory=SdOptions)  # models and memory of Stable Diffusion
     bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end

@@ -1,6 +1,6 @@
 """Classifier Score Distillation: one function of three noise predictions, shared by all diffusion models.
 
-Classic score distillation is the same sum with other weights: with DreamFusion's guidance weight w (its Eq. 4),
+Classic score distillation is the same sum with other weights: with the guidance weight w of DreamFusion (Section 2),
 (1 + w) positive - w null - noise = w (positive - null) + (positive - noise).
 """
 
