@@ -7,7 +7,7 @@ import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
 from stages.distill.options import GIVEN, LOSSES, DistillOptions
-from stages.sd.options import MEMORY, SdOptions
+from stages.sd.options import SdOptions
 
 DEFAULT, SD = defaults(DistillOptions), defaults(SdOptions)
 UNIT = click.FloatRange(0)
@@ -33,8 +33,8 @@ def weight(name: str, text: str) -> Any:
               help="Stable Diffusion, for --guidance sd: a folder in the layout of diffusers, or an id of the hub.")
 @click.option("--controlnet", default=SD["controlnet"], metavar="FOLDER|ID",
               help="Its light and geometry ControlNet, likewise.")
-@click.option("--vram", type=click.Choice([str(n) for n in MEMORY]), default=SD["vram"], metavar="GIB",
-              help="For --guidance sd: GPU memory to stay within, 8, 12, 16 or 24; otherwise what the GPU has.")
+@click.option("--vram", type=click.IntRange(8), default=SD["vram"], metavar="GIB",
+              help="For --guidance sd: GPU memory to stay within; 8, 12 and 16 save ever less.  [default: what it has]")
 @click.option("--steps", type=click.IntRange(1), default=DEFAULT["steps"], show_default=True, metavar="N",
               help="Optimiser steps.")
 @click.option("--batch", type=click.IntRange(1, 256), default=DEFAULT["batch"], show_default=True, metavar="N",
@@ -63,8 +63,7 @@ def command(conditions: Path, output: Path, common: Common, **chosen: Any) -> No
 
     Stopped by Ctrl-C or a kill, the same command continues; on a CPU the result has the same bytes either way.
     """
-    vram = chosen.pop("vram")
-    sd = SdOptions(chosen.pop("sd_model"), chosen.pop("controlnet"), vram and int(vram))
+    sd = SdOptions(**{name: chosen.pop(name) for name in SD})
     options = DistillOptions(**chosen, sd=sd)
     if plan(common, "distill", output, options):
         return

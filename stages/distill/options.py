@@ -32,5 +32,5 @@ class DistillOptions:
     anchor: float = 0.5  # weight of the distance between the mean material and what the words alone call for
     given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
     lights: str = "all"  # environments that steps are lit by: "all", or "one", the first
-    sd: SdOptions = field(default_factory=SdOptions)  # models and memory of Stable Diffusion
     bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end
+    sd: SdOptions = field(default_factory=SdOptions)  # models and memory of Stable Diffusion

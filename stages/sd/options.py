@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-MEMORY = (8, 12, 16, 24)
-
 
 @dataclass(frozen=True)
 class SdOptions:
@@ -11,4 +9,4 @@ class SdOptions:
 
     sd_model: str = ""  # the base: unet, vae, text_encoder, tokenizer, scheduler
     controlnet: str = ""  # 22 channels, trained on that base
-    vram: int | None = None  # GiB of the GPU to stay within, one of MEMORY; None: what it has
+    vram: int | None = None  # GiB of the GPU to stay within (see `stages.sd.memory`); None: what it has

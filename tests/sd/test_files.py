@@ -133,6 +133,16 @@ def test_wrong_folders_are_one_line(written: Path, sd_model: str, controlnet: st
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
+def test_stable_diffusion_2_1_fits_and_takes_views_of_512(folder: Path) -> None:
+    """The numbers of its config files."""
+    levels = {"block_out_channels": [320, 640, 1280, 1280], "layers_per_block": 2, "cross_attention_dim": 1024}
+    config(UNET, **levels)(folder)
+    config(CONTROL, **levels, conditioning_embedding_out_channels=[16, 32, 96, 256])(folder)
+    config("sd/vae/config.json", block_out_channels=[128, 256, 512, 512], layers_per_block=2)(folder)
+    config("sd/text_encoder/config.json", hidden_size=1024)(folder)
+    assert find_models(options(folder)).multiple == 64
+
+
 def test_a_missing_package_is_named(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(files, "PACKAGES", ("diffusers", "no_such_package"))
     with pytest.raises(InputError, match=r'needs no_such_package, not installed here; pip install "\.\[sd\]"'):
