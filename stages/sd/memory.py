@@ -27,9 +27,12 @@ class Plan:
 
 
 def plan(vram: int | None, device: torch.device) -> Plan:
-    """The plan that stays within so many GiB. Args: vram: None for what the device has; a CPU has enough."""
+    """The plan that stays within so many GiB. Args: vram: None for what the device has; a CPU has enough.
+
+    Off a GPU there is nowhere else to wait than in host memory.
+    """
     if vram is None:
         if device.type != "cuda":
             return Plan()
         vram = round(torch.cuda.get_device_properties(device).total_memory / 2**30)
-    return Plan(checkpoint=vram < 24, slices=vram < 16, offload=vram < 12)
+    return Plan(checkpoint=vram < 24, slices=vram < 16, offload=vram < 12 and device.type == "cuda")

@@ -99,7 +99,7 @@ def asked(model: StableDiffusion, views: Views, progress: float = 0.0, **options
 
 @pytest.mark.parametrize("loss", ["csd", "sds"])
 def test_gradient_is_the_papers_from_three_separate_calls(model: StableDiffusion, views: Views, loss: str) -> None:
-    """DreamMat, Eq. 7, and score distillation with guidance weight 100, written out, each branch and image predicted by itself."""
+    """DreamMat, Eq. 7, and DreamFusion with guidance weight 100, each branch and image predicted by itself."""
     made, progress = guidance(model, views, loss=loss), 0.25
     sample, radiance = shown(made)
     response = made.respond(radiance, sample, progress, torch.Generator().manual_seed(7))

@@ -138,9 +138,17 @@ def test_precisions_of_a_gpu_stay_finite_and_near_float32(folder: Path, model: S
         assert away < 0.05
 
 
-@pytest.mark.parametrize("vram", [8, 12, 16, 24])
-def test_saving_memory_changes_nothing_else(folder: Path, model: StableDiffusion, vram: int) -> None:
-    saving = load(folder, memory.plan(vram, CPU))
+PLANS = {
+    24: Plan(),
+    16: Plan(checkpoint=True),
+    12: Plan(checkpoint=True, slices=True),
+    8: Plan(checkpoint=True, slices=True, offload=True),
+}
+
+
+@pytest.mark.parametrize("plan", PLANS.values(), ids=str)
+def test_saving_memory_changes_nothing_else(folder: Path, model: StableDiffusion, plan: Plan) -> None:
+    saving = load(folder, plan)
     x_t, t, text, conditions = inputs(3)
     expected = model.predict_noise(x_t, t, text, conditions, 0.9)
     torch.testing.assert_close(saving.predict_noise(x_t, t, text, conditions, 0.9), expected, rtol=1e-4, atol=1e-5)
@@ -152,20 +160,26 @@ def test_saving_memory_changes_nothing_else(folder: Path, model: StableDiffusion
 
 
 def test_less_memory_saves_more() -> None:
-    assert [memory.plan(vram, CPU) for vram in (24, 16, 12, 8)] == [
-        Plan(),
-        Plan(checkpoint=True),
-        Plan(checkpoint=True, slices=True),
-        Plan(checkpoint=True, slices=True, offload=True),
-    ]
-    assert memory.plan(None, CPU) == Plan()
+    gpu = torch.device("cuda")
+    assert {vram: memory.plan(vram, gpu) for vram in PLANS} == PLANS
+    assert memory.plan(None, CPU) == Plan() and not memory.plan(8, CPU).offload
+
+
+@pytest.mark.parametrize(("total", "like"), [(7.8, 8), (11.76, 12), (15.7, 16), (23.6, 24), (139.8, 24)])
+def test_a_gpu_decides_by_what_it_has(monkeypatch: pytest.MonkeyPatch, total: float, like: int) -> None:
+    """Cards report a little less than their name says."""
+
+    class Properties:
+        total_memory = int(total * 2**30)
+
+    monkeypatch.setattr(torch.cuda, "get_device_properties", lambda device: Properties)
+    assert memory.plan(None, torch.device("cuda")) == PLANS[like]
 
 
 def test_plans_reach_the_networks(folder: Path) -> None:
-    small = load(folder, memory.plan(8, CPU))
+    small, large = load(folder, PLANS[8]), load(folder, PLANS[24])
     assert small.vae.use_slicing and small.vae.encoder.gradient_checkpointing
     assert any(hasattr(module, "_diffusers_hook") for module in small.denoiser.modules())
-    large = load(folder, memory.plan(24, CPU))
     assert not large.vae.use_slicing and not large.vae.encoder.gradient_checkpointing
     assert not any(hasattr(module, "_diffusers_hook") for module in large.denoiser.modules())
 
