@@ -5,6 +5,7 @@ VENV   ?= .venv
 RUN    := $(VENV)/bin
 DREAMMAT := $(RUN)/dreammat
 VALIDATOR := $(VENV)/.validator
+DIFFUSION := $(VENV)/.diffusion
 MITSUBA := $(VENV)/.mitsuba
 CYCLES  := $(VENV)/.cycles
 
@@ -35,6 +36,11 @@ $(VENV)/.ready: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "dreammat needs Python 3.10 or newer")'
 	$(PYTHON) -m venv $(VENV)
 	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,report]'
+	@touch $@
+
+# the packages of --guidance sd, which its tests run on a tiny model
+$(DIFFUSION): pyproject.toml | $(VENV)/.ready
+	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sd]'
 	@touch $@
 
 # the Khronos glTF validator, where npm can get it; its test says so and skips otherwise
@@ -89,7 +95,7 @@ asset: $(VENV)/.ready  ## one mesh and prompt: make asset MESH=chair.obj PROMPT=
 batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
 	$(MAKE) $(patsubst %/prompt.txt,%/asset/bake.json,$(wildcard $(JOBS)/*/prompt.txt))
 
-test: $(VENV)/.ready $(VALIDATOR)  ## all tests
+test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
 
 lint: $(VENV)/.ready  ## ruff and mypy

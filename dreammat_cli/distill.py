@@ -6,9 +6,10 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
-from stages.distill.options import GIVEN, DistillOptions
+from stages.distill.options import GIVEN, LOSSES, DistillOptions
+from stages.sd.options import SdOptions
 
-DEFAULT = defaults(DistillOptions)
+DEFAULT, SD = defaults(DistillOptions), defaults(SdOptions)
 UNIT = click.FloatRange(0)
 
 
@@ -24,10 +25,16 @@ def weight(name: str, text: str) -> Any:
 @click.option("--prompt", default=DEFAULT["prompt"], metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
 @click.option("--negative-prompt", default=DEFAULT["negative_prompt"], show_default=True, metavar="TEXT",
               help="What the picture should not look like.")
-@click.option("--guidance", type=click.Choice(["prior", "reference"]), default=DEFAULT["guidance"], show_default=True,
-              help="The embedded diffusion model, or the known material of --reference.")
+@click.option("--guidance", type=click.Choice(["prior", "sd", "reference"]), default=DEFAULT["guidance"], show_default=True,
+              help="The embedded diffusion model, Stable Diffusion, or the known material of --reference.")
 @click.option("--reference", type=INPUT, default=DEFAULT["reference"], metavar="MODEL.glb",
               help="A textured model of the same shape, for --guidance reference.")
+@click.option("--sd-model", default=SD["sd_model"], metavar="FOLDER|ID",
+              help="Stable Diffusion, for --guidance sd: a folder in the layout of diffusers, or an id of the hub.")
+@click.option("--controlnet", default=SD["controlnet"], metavar="FOLDER|ID",
+              help="Its light and geometry ControlNet, likewise.")
+@click.option("--vram", type=click.IntRange(8), default=SD["vram"], metavar="GIB",
+              help="For --guidance sd: GPU memory to stay within; 8, 12 and 16 save ever less.  [default: what it has]")
 @click.option("--steps", type=click.IntRange(1), default=DEFAULT["steps"], show_default=True, metavar="N",
               help="Optimiser steps.")
 @click.option("--batch", type=click.IntRange(1, 256), default=DEFAULT["batch"], show_default=True, metavar="N",
@@ -38,10 +45,12 @@ def weight(name: str, text: str) -> Any:
               help="Same seed, same result.")
 @click.option("--device", default=DEFAULT["device"], show_default=True, help="A torch device: cpu, cuda, mps.")
 @weight("smoothness", "Weight of the difference between neighbouring points' materials.")
-@weight("eta1", "Weight of the positive prediction (paper, Eq. 7).")
+@click.option("--loss", type=click.Choice(LOSSES), default=DEFAULT["loss"], show_default=True,
+              help="Classifier score distillation, with weights that suit the model, or DreamFusion's.")
+@weight("eta1", "Weight of the positive prediction (paper, Eq. 7), in place of the loss's own.")
 @click.option("--eta2", type=(UNIT, UNIT), default=DEFAULT["eta2"], show_default=True, metavar="START END",
-              help="Of the negative one, at the first step and from two thirds of the steps on.")
-@weight("posterior", "Share of the posterior-mean term; 0 is the paper's pure classifier score.")
+              help="Of the negative one, at the first step and from two thirds of the steps on; likewise.")
+@weight("posterior", "Share of the posterior-mean term, 0 in the paper's pure classifier score; likewise.")
 @weight("anchor", "Weight of the distance between the mean material and what the words alone call for.")
 @weight("bimodal", "How strongly metallic is sent to 0 or 1 towards the end.")
 @click.option("--given", type=click.Choice(GIVEN), default=DEFAULT["given"], show_default=True,
@@ -54,7 +63,8 @@ def command(conditions: Path, output: Path, common: Common, **chosen: Any) -> No
 
     Stopped by Ctrl-C or a kill, the same command continues; on a CPU the result has the same bytes either way.
     """
-    options = DistillOptions(**chosen)
+    sd = SdOptions(**{name: chosen.pop(name) for name in SD})
+    options = DistillOptions(**chosen, sd=sd)
     if plan(common, "distill", output, options):
         return
     from stages.distill.stage import distill

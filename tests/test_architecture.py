@@ -11,12 +11,13 @@ ALLOWED = {
     "core": set(),
     "light": {"core"},
     "prior": {"core"},
+    "sd": {"core"},
     "prep": {"core", "light", "prior"},
     "conditions": {"core", "light", "prior"},
-    "distill": {"core", "light", "prior"},
+    "distill": {"core", "light", "prior", "sd"},
     "bake": {"core", "light", "prior"},
-    "train": {"core", "light", "prior", "prep", "conditions", "distill", "bake"},
-    "report": {"core", "light", "prior", "prep", "conditions", "distill", "bake", "train"},
+    "train": {"core", "light", "prior", "sd", "prep", "conditions", "distill", "bake"},
+    "report": {"core", "light", "prior", "sd", "prep", "conditions", "distill", "bake", "train"},
 }
 
 SOURCES = sorted(path for package in ("stages", "dreammat_cli") for path in (ROOT / package).rglob("*.py"))

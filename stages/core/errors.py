@@ -33,3 +33,8 @@ class NumericalError(DreammatError):
     """A value that must be finite is not; the message names step, view, pixel or seed."""
 
     exit_code = 6
+
+
+def one_line(error: BaseException) -> str:
+    """What another library's exception says, short enough to be part of a line."""
+    return " ".join(str(error).split())[:160] or type(error).__name__

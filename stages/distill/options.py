@@ -1,9 +1,12 @@
 """What distillation can be asked for. Symbols are those of the paper (Zhang et al. 2024, DreamMat)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from stages.sd.options import SdOptions
+
 GIVEN = ("none", "geometry", "light", "full")
+LOSSES = ("csd", "sds")
 
 NEGATIVE_PROMPT = "blurry, low quality, noisy, shadows, highlights, baked lighting"
 
@@ -12,7 +15,7 @@ NEGATIVE_PROMPT = "blurry, low quality, noisy, shadows, highlights, baked lighti
 class DistillOptions:
     """Options of `stages.distill.stage.distill`; `--guidance reference` uses those marked * and nothing below them."""
 
-    guidance: str = "prior"  # * "prior": the embedded diffusion model; "reference": the known material of a model
+    guidance: str = "prior"  # * "prior": the embedded diffusion model; "sd": Stable Diffusion; "reference": a known material
     reference: Path | None = None  # * glTF binary or other textured scene, for the reference guidance
     steps: int | None = None  # * optimiser steps; None: what the guidance calls for
     batch: int = 1  # * images a step, or that many times PIXELS for the reference
@@ -22,10 +25,12 @@ class DistillOptions:
     smoothness: float = 0.0  # * weight of ‖Γ(p) - Γ(p + ε)‖²
     prompt: str = ""  # what the object is made of
     negative_prompt: str = NEGATIVE_PROMPT  # what the picture should not look like
-    eta1: float = 2.5  # weight of the positive prediction, Eq. 7; the paper's is 1.05
-    eta2: tuple[float, float] = (0.0, 0.0)  # of the negative one, at the start and from two thirds on; paper: 1, 0.5
-    posterior: float = 0.5  # share of (eps_pos - noise) added to the classifier score; 0 is the paper's
+    loss: str = "csd"  # one of LOSSES: classifier score distillation, or the classic one; sets the next three
+    eta1: float | None = None  # weight of the positive prediction, Eq. 7; None: what loss and guidance call for
+    eta2: tuple[float, float] | None = None  # of the negative one, at the start and from two thirds on; None: likewise
+    posterior: float | None = None  # share of (eps_pos - noise) added to the classifier score; None: likewise
     anchor: float = 0.5  # weight of the distance between the mean material and what the words alone call for
     given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
     lights: str = "all"  # environments that steps are lit by: "all", or "one", the first
     bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end
+    sd: SdOptions = field(default_factory=SdOptions)  # models and memory of Stable Diffusion

@@ -107,15 +107,27 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
         chosen = step_generator(options.seed, POOL)
         pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device)
         return reference.ReferenceGuidance(asset, pool)
-    if options.guidance == "prior":
-        from stages.distill.guidance import prior
-        from stages.prior.model import load_prior
+    if options.guidance not in ("prior", "sd"):
+        raise InputError(f"--guidance {options.guidance}: unknown; expected prior, sd or reference")
+    if not options.prompt.strip():
+        raise InputError("--prompt: empty; say what the object is made of, such as \"weathered bronze\"")
+    if options.guidance == "sd":
+        return _stable_diffusion(options, views, device)
+    from stages.distill.guidance import prior
+    from stages.prior.model import load_prior
 
-        if not options.prompt.strip():
-            raise InputError("--prompt: empty; say what the object is made of, such as \"weathered bronze\"")
-        model = load_prior(device)
-        return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device, options.lights), options)
-    raise InputError(f"--guidance {options.guidance}: unknown; expected prior or reference")
+    model = load_prior(device)
+    return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device, options.lights), options)
+
+
+def _stable_diffusion(options: DistillOptions, views: Views, device: torch.device) -> Guidance:
+    from stages.distill.guidance import sd
+    from stages.sd import files, memory, models
+
+    found = files.find_models(options.sd)
+    sampler = CropSampler(views, sd.view_size(views, found), options.batch, device, options.lights)
+    model = models.load_models(found, device, memory.plan(options.sd.vram, device))
+    return sd.StableDiffusionGuidance(model, sampler, options)
 
 
 def new_state(options: DistillOptions, views: Views, device: torch.device, start: Tensor | None) -> State:
@@ -249,7 +261,10 @@ def _device(options: DistillOptions) -> torch.device:
 
 def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Guidance) -> Provenance:
     chosen = plain_options(options) | dataclasses.asdict(budget)
+    if guidance.weights:
+        chosen |= plain_options(guidance.weights)
     chosen["reference"] = options.reference.name if options.reference else None
+    del chosen["sd"]  # its models are known by their hashes
     inputs = {"conditions": views.digest, "prep": views.prep, **guidance.inputs}
     extra = {"prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments}
     return Provenance(chosen, options.seed, inputs, extra)

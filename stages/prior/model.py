@@ -9,9 +9,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
+from stages.core import diffusion
 from stages.core.artifact import Field, Provenance, Schema, load_npz, save_npz, sha256_file
 from stages.core.errors import ArtifactError
-from stages.prior import diffusion, profile
+from stages.prior import profile
 from stages.prior.network import CONDITIONS, Denoiser
 from stages.prior.text import WEIGHTS_FOLDER, TextEmbedding, TextEncoder, Vocabulary
 

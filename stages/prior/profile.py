@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from stages.core.color import luminance
+from stages.core.depth import inverse_depth
 
 SIZE = 64
 """Pixels along an edge of the model's images."""
@@ -70,15 +71,6 @@ def prepare(depth: Tensor, normal: Tensor, mask: Tensor, lights: Tensor) -> Tens
     background = torch.tensor([0.5, 0.5, 1.0], dtype=normal.dtype, device=normal.device)[:, None, None]
     direction = torch.where(inside, normal * 0.5 + 0.5, background)
     return torch.cat([inverse_depth(depth, inside), direction, torch.where(inside, tone(lights), 0.0)], 1)
-
-
-def inverse_depth(depth: Tensor, inside: Tensor) -> Tensor:
-    """0.3 + 0.7 (inv - min) / (max - min) of inv = 1 / depth over each image's mask; 0 outside. Shapes (B, 1, S, S)."""
-    inverse = 1 / torch.where(inside, depth, 1.0)
-    low = torch.where(inside, inverse, math.inf).amin((1, 2, 3), keepdim=True)
-    high = torch.where(inside, inverse, -math.inf).amax((1, 2, 3), keepdim=True)
-    span = torch.where(high > low, high - low, 1.0)
-    return torch.where(inside, 0.3 + 0.7 * (inverse - torch.where(low.isfinite(), low, 0.0)) / span, 0.0)
 
 
 def drop(conditions: Tensor, geometry: Tensor, light: Tensor) -> Tensor:

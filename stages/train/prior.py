@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from stages.core import diffusion
 from stages.core.artifact import (
     Field,
     Provenance,
@@ -31,7 +32,6 @@ from stages.core.artifact import (
 )
 from stages.core.errors import NumericalError
 from stages.core.progress import Progress, silent
-from stages.prior import diffusion
 from stages.prior.model import VOCABULARY_FILE, WEIGHTS, PriorNetwork, save_weights
 from stages.prior.profile import drop
 from stages.prior.text import TextEmbedding, Vocabulary

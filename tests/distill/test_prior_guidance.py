@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from stages.core.shading import Material, shade
-from stages.distill.guidance.prior import PriorGuidance, view_words
+from stages.distill.guidance.prior import PriorGuidance
 from stages.distill.options import DistillOptions
 from stages.distill.sampling import CropSampler
 from stages.distill.views import Views
@@ -113,15 +113,6 @@ def test_same_generator_same_gradient(views: Views) -> None:
     sample, radiance, _ = shown(made)
     a, b, c = (made.respond(radiance, sample, 0.1, torch.Generator().manual_seed(s)).gradient for s in (1, 1, 2))
     assert torch.equal(a, b) and not torch.equal(a, c)
-
-
-@pytest.mark.parametrize(
-    "azimuth, elevation, words",
-    [(0, 0, "front view"), (44, 20, "front view"), (90, 0, "side view"), (-90, 0, "side view"), (180, 10, "back view"),
-     (-150, 0, "back view"), (400, 0, "front view"), (0, 75, "overhead view")],
-)
-def test_view_words(azimuth: float, elevation: float, words: str) -> None:
-    assert view_words(math.radians(azimuth), math.radians(elevation)) == words
 
 
 def test_inputs_name_the_weights(views: Views) -> None:

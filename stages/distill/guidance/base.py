@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import torch
 from torch import Tensor
 
+from stages.distill.guidance.csd import Weights
 from stages.distill.sampling import Sample, Sampler
 
 
@@ -44,11 +45,14 @@ class Guidance(Protocol):
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
     inputs: role -> SHA-256 of the files it was made from. start: (5,) linear albedo, roughness and metallic from which
     the field had best begin, or None where it makes no difference. budget: what it calls for where the options leave it
-    open.
+    open. weights: of its score, or None where it has none.
     """
 
     @property
     def sampler(self) -> Sampler: ...
+
+    @property
+    def weights(self) -> Weights | None: ...
 
     identity: dict[str, Any]
     inputs: dict[str, str]

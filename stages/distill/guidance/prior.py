@@ -5,18 +5,16 @@ diffusion time; the score moves the picture. All three branches (prompt, no prom
 conditions, or colours shift.
 """
 
-import math
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from stages.core.color import srgb_decode
 from stages.core.shading import light_maps
-from stages.distill import schedule
 from stages.distill.guidance.base import Budget, Response
-from stages.distill.guidance.csd import classifier_score, posterior_score
+from stages.distill.guidance.csd import Weights, chosen_weights, distillation_score
+from stages.distill.guidance.view_words import VIEW_WORDS, words_of
 from stages.distill.options import DistillOptions
 from stages.distill.sampling import CropSampler, Images, Sample
 from stages.prior.model import Prior
@@ -24,19 +22,8 @@ from stages.prior.text import TextEmbedding
 
 BUDGET = Budget(steps=1500, learning_rate=0.01)
 
-OVERHEAD = math.radians(60)
-FRONT, BACK = math.radians(45), math.radians(135)
-
-
-def view_words(azimuth: float, elevation: float) -> str:
-    """What a prompt says about the camera. Args: radians; the object's front is at azimuth 0.
-
-    Source: Poole et al. 2022, "DreamFusion", Section 3.2; the bounds are those of the released DreamMat code.
-    """
-    if elevation > OVERHEAD:
-        return "overhead view"
-    turned = abs(math.remainder(azimuth, 2 * math.pi))
-    return "front view" if turned < FRONT else "back view" if turned > BACK else "side view"
+OWN = Weights(eta1=2.5, eta2=(0.0, 0.0), posterior=0.5)
+"""What `--loss csd` means for this model."""
 
 
 class PriorGuidance:
@@ -46,10 +33,9 @@ class PriorGuidance:
         self.sampler = sampler
         self.identity: dict[str, Any] = prior.identity
         self.inputs = {"prior": prior.identity["weights"]}
-        self.budget = BUDGET
+        self.budget, self.weights = BUDGET, chosen_weights(options, OWN)
         self._prior, self._options = prior, options
-        words = ("front view", "side view", "back view", "overhead view")
-        self._positive = {word: prior.embed([f"{options.prompt}, {word}"]) for word in words}
+        self._positive = {words: prior.embed([f"{options.prompt}, {words}"]) for words in VIEW_WORDS}
         self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
         expected = prior.expected_material([options.prompt])[0]
         self.start: Tensor | None = torch.cat([srgb_decode(expected[:3]), expected[3:]])
@@ -63,7 +49,11 @@ class PriorGuidance:
             conditions = prior.drop(conditions, geometry=given != "geometry", light=given != "light")
         leaf = radiance.detach().requires_grad_()
         picture = prior.profile_tone(exposure * images.paint(leaf))  # (B, 3, S, S)
-        score = self._score(picture.detach(), conditions, images, progress, generator)
+
+        def predict(x_t: Tensor, t: Tensor, branches: int) -> Tensor:
+            return prior.predict_noise(x_t, t, conditions.repeat(branches, 1, 1, 1), self._text(images, branches))
+
+        score = distillation_score(predict, picture.detach(), prior.alpha_bar, self.weights, progress, generator)
         (gradient,) = torch.autograd.grad(picture, leaf, score / len(radiance))
         on_object = images.paint(torch.ones_like(radiance[:, :1]))
         return Response(gradient, float((score * on_object).square().mean().sqrt()))
@@ -77,29 +67,8 @@ class PriorGuidance:
         depth, normal = images.paint(images.surface.depth[:, None]), images.paint(images.surface.view_normals)
         return exposure, self._prior.prepare(depth, normal, mask, exposure * lights)
 
-    def _score(
-        self, picture: Tensor, conditions: Tensor, images: Images, progress: float, generator: torch.Generator
-    ) -> Tensor:
-        """Weighted gradient with respect to the toned picture (B, 3, S, S)."""
-        options, count, device = self._options, images.count, picture.device
-        low, high = schedule.time_range(progress)
-        t = torch.randint(low, high + 1, (count,), generator=generator).to(device)
-        noise = torch.randn(picture.shape, generator=generator).to(device)
-        alpha_bar = self._prior.alpha_bar[t][:, None, None, None]
-        x_t = alpha_bar.sqrt() * picture + (1 - alpha_bar).sqrt() * noise
-        eta2 = schedule.eta2(progress, *options.eta2)
-        branches = 3 if eta2 else 2  # a negative prompt without weight is not asked
-        text = self._text(images, branches)
-        positive, null, *rest = self._prior.predict_noise(
-            x_t.repeat(branches, 1, 1, 1), t.repeat(branches), conditions.repeat(branches, 1, 1, 1), text
-        ).chunk(branches)
-        negative = rest[0] if rest else null
-        score = classifier_score(positive, null, negative, options.eta1, eta2)
-        return (1 - alpha_bar) * (score + options.posterior * posterior_score(positive, noise))
-
     def _text(self, images: Images, branches: int) -> TextEmbedding:
         """Prompt with view words, no prompt, and negative prompt, for B images each; the first `branches` of them."""
-        places = zip(np.atleast_1d(images.azimuth), np.atleast_1d(images.elevation), strict=True)
-        positive = [self._positive[view_words(float(a), float(e))] for a, e in places]
+        positive = [self._positive[words] for words in words_of(images)]
         rest = [self._null, self._negative][: branches - 1]
         return TextEmbedding.cat([*positive, *(text.expand(images.count) for text in rest)])

@@ -162,7 +162,7 @@ class ReferenceGuidance:
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
         self.start: Tensor | None = None
-        self.budget = BUDGET
+        self.budget, self.weights = BUDGET, None
         self._found = torch.from_numpy(found)
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)
         self._floor = FLOOR * self._target.mean((0, 2))  # (L,)

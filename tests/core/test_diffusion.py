@@ -1,6 +1,6 @@
 import torch
 
-from stages.prior import diffusion
+from stages.core import diffusion
 
 
 def test_schedule_falls_from_clean_to_noise() -> None:

@@ -1,0 +1,89 @@
+"""Guidance by Stable Diffusion and the light- and geometry-aware ControlNet: the paper's own.
+
+The rendered view, Filmic on white, is encoded; its latents are noised to a random diffusion time, and the score on them
+goes back through the encoder to the pixels. All three branches (prompt, no prompt, negative prompt) get the same
+conditions, or colours shift.
+
+The light maps are those of `core.shading`: glTF's dielectric (F0 = 0.04) and direct light. The ControlNet has seen Blender's,
+with F0 = 0.08, Burley's diffuse lobe and one bounce.
+"""
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from stages.core.errors import InputError
+from stages.core.shading import light_maps
+from stages.distill import schedule
+from stages.distill.guidance.base import Budget, Response
+from stages.distill.guidance.csd import CSD, chosen_weights, distillation_score
+from stages.distill.guidance.view_words import VIEW_WORDS, words_of
+from stages.distill.options import DistillOptions
+from stages.distill.sampling import CropSampler, Images, Sample
+from stages.distill.views import Views
+from stages.sd import profile
+from stages.sd.files import ModelFiles
+from stages.sd.models import StableDiffusion
+
+BUDGET = Budget(steps=4000, learning_rate=0.01)
+"""Source: Zhang et al. 2024, DreamMat, Section 4.1."""
+
+
+def view_size(views: Views, files: ModelFiles) -> int:
+    """Edge of the square that shows a whole view, pixel for pixel. Raises: InputError when the model cannot take it."""
+    size = max(views.width, views.height)
+    if size % files.multiple:
+        raise InputError(
+            f"{views.folder}: views are {views.width} x {views.height} pixels, expected a multiple of {files.multiple} for "
+            "--guidance sd; make the conditions with --size 512, the size that Stable Diffusion 2.1 base knows"
+        )
+    return size
+
+
+class StableDiffusionGuidance:
+    """See `Guidance`. Args: model: loaded; sampler: of crops of `view_size`."""
+
+    def __init__(self, model: StableDiffusion, sampler: CropSampler, options: DistillOptions) -> None:
+        self.sampler = sampler
+        self.identity: dict[str, Any] = model.identity
+        self.inputs: dict[str, str] = model.hashes
+        self.start: Tensor | None = None
+        self.budget, self.weights = BUDGET, chosen_weights(options, CSD)
+        self._model, self._given = model, options.given
+        prompts = [f"{options.prompt}, {words}" for words in VIEW_WORDS]
+        self._text = model.embed([*prompts, "", options.negative_prompt])  # (6, T, D)
+
+    def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
+        """See `Guidance.respond`; the number for the curve is the root mean square of the score on the latents."""
+        assert sample.images is not None
+        images, model = sample.images, self._model
+        mask = images.paint(torch.ones_like(radiance[:, :1]))
+        conditions = self._conditions(images, sample, mask)
+        leaf = radiance.detach().requires_grad_()
+        latents = model.encode(profile.picture(images.paint(leaf), mask))
+
+        def predict(x_t: Tensor, t: Tensor, branches: int) -> Tensor:
+            given = None if conditions is None else conditions.repeat(branches, 1, 1, 1)
+            return model.predict_noise(x_t, t, self._branches(images, branches), given, schedule.control_scale(progress))
+
+        score = distillation_score(predict, latents.detach(), model.alpha_bar, self.weights, progress, generator)
+        (gradient,) = torch.autograd.grad(latents, leaf, score)
+        return Response(gradient / len(radiance), float(score.square().mean().sqrt()))
+
+    def _conditions(self, images: Images, sample: Sample, mask: Tensor) -> Tensor | None:
+        """Condition channels (B, 22, S, S), what is not given 0; None without any, for the base alone."""
+        if self._given == "none":
+            return None
+        depth, normal = images.paint(images.surface.depth[:, None]), images.paint(images.surface.view_normals)
+        lights = images.paint(light_maps(sample.transport.to(torch.float32)).flatten(1))
+        conditions = profile.prepare(depth, normal, mask, lights)
+        return profile.without(conditions, geometry=self._given == "light", light=self._given == "geometry")
+
+    def _branches(self, images: Images, branches: int) -> Tensor:
+        """Text (N B, T, D): prompt with view words, no prompt, and negative prompt, for B images each; the first N."""
+        null, negative = len(VIEW_WORDS), len(VIEW_WORDS) + 1
+        rows = [VIEW_WORDS.index(words) for words in words_of(images)]
+        rows += [null] * images.count + [negative] * images.count
+        chosen = torch.tensor(rows[: branches * images.count]).to(self._text.device, non_blocking=True)
+        return self._text[chosen]
