@@ -30,38 +30,52 @@ LEAST_SLOPE = 1e-4
 """m (1 - m) is taken no smaller when dividing by a sigmoid's slope."""
 
 
-def material_gradient(
-    transport: Transport, material: Material, response: Response, progress: float
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Gradients that send a sigmoid's logits to each point's Gauss-Newton solution, as a mean over points.
+ROUGHNESS = 3
+"""Column of a material's five values."""
+
+HELD = 1e6
+"""Damping of a value that must stay."""
+
+
+def logit_gradient(values: Tensor, goal: Tensor) -> Tensor:
+    """Gradient by a sigmoid's values that sends its logits to a goal, as a mean over points. Args: (P, 5) each."""
+    return (values - goal) / (values * (1 - values)).clamp(min=LEAST_SLOPE) / len(values)
+
+
+def proposal(
+    transport: Transport, material: Material, response: Response, progress: float, held: int | None = None
+) -> Tensor:
+    """The damped Gauss-Newton step of every point: (P, 5), each value within `LARGEST`.
 
     Args:
         transport: P L rows. material: of P points, detached. response: with gradient and curvature (P L, 3).
-        progress: of the run, in [0, 1).
-    Returns:
-        gradients of albedo (P, 3), roughness (P,) and metallic (P,).
+        progress: of the run, in [0, 1). held: column of a value that stays as it is.
     """
-    x = torch.cat([material.albedo, material.roughness[:, None], material.metallic[:, None]], 1)  # (P, 5)
-    goal = (x + proposal(transport, material, response, progress)).clamp(0.0, 1.0)
-    gradient = (x - goal) / (x * (1 - x)).clamp(min=LEAST_SLOPE) / len(x)
-    return gradient[:, :3], gradient[:, 3], gradient[:, 4]
-
-
-def proposal(transport: Transport, material: Material, response: Response, progress: float) -> Tensor:
-    """The damped Gauss-Newton step of every point: (P, 5), each value within `LARGEST`."""
-    assert response.curvature is not None
     points = len(material.roughness)
     jacobian = _jacobian(transport, material)  # (P, 3 L, 5)
-    by_radiance, curvature = (points * t.reshape(points, -1) for t in (response.gradient, response.curvature))
+    by_radiance, curvature = _per_point(response, points)
     gradient = torch.einsum("pn,pnk->pk", by_radiance, jacobian)
     damping = DAMPING_START * (DAMPING_END / DAMPING_START) ** progress
     gradient[:, 3] -= damping * response.plain
     gradient[:, 4] += damping * response.plain
     normal = (jacobian * curvature[..., None]).mT @ jacobian
-    squared = (by_radiance.square() / curvature.clamp(min=torch.finfo(curvature.dtype).tiny)).sum(1)  # mean residual²
-    identity = torch.eye(5, dtype=normal.dtype, device=normal.device)
-    damped = normal + (damping + DOUBT * squared)[:, None, None] * identity
+    damped = normal + torch.diag_embed((damping + DOUBT * misfit(response, points))[:, None].expand(-1, 5))
+    if held is not None:
+        damped[:, held, held] += HELD
     return -torch.linalg.solve(damped, gradient[..., None])[..., 0].clamp(-LARGEST, LARGEST)
+
+
+def misfit(response: Response, points: int) -> Tensor:
+    """Mean squared residual of every point, as its loss counts it: (P,)."""
+    by_radiance, curvature = _per_point(response, points)
+    return (by_radiance.square() / curvature.clamp(min=torch.finfo(curvature.dtype).tiny)).sum(1)
+
+
+def _per_point(response: Response, points: int) -> tuple[Tensor, Tensor]:
+    """Gradient and curvature of each point's own loss: (P, 3 L) each."""
+    assert response.curvature is not None
+    gradient, curvature = (points * t.reshape(points, -1) for t in (response.gradient, response.curvature))
+    return gradient, curvature
 
 
 def _jacobian(transport: Transport, material: Material) -> Tensor:

@@ -3,6 +3,7 @@
 import torch
 from torch import Tensor
 
+from stages.core.color import srgb_encode
 from stages.core.shading import Material
 
 REACH = 0.05
@@ -37,3 +38,13 @@ def distance_of_means(material: Material, expected: Tensor) -> Tensor:
     """
     mean = torch.cat([material.albedo.mean(0), material.roughness.mean()[None], material.metallic.mean()[None]])
     return (mean - expected.to(mean)).square().sum()
+
+
+def distance_to(material: Material, seen: Tensor) -> Tensor:
+    """Squared distance to a material that each point is taken for, mean over points. Differentiable in: material.
+
+    Args:
+        seen: (P, 5) sRGB albedo, roughness, metallic.
+    """
+    values = torch.cat([srgb_encode(material.albedo), material.roughness[:, None], material.metallic[:, None]], 1)
+    return (values - seen).square().sum(1).mean()

@@ -42,6 +42,10 @@ class Images:
         flat = values.new_zeros(self.count * self.size**2, values.shape[1]).index_copy(0, self.pixel, values)
         return flat.view(self.count, self.size, self.size, -1).permute(0, 3, 1, 2)
 
+    def pick(self, images: Tensor) -> Tensor:
+        """The points' values (P, C) in images (B, C, S, S)."""
+        return images.permute(0, 2, 3, 1).flatten(0, 2).index_select(0, self.pixel)
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -58,6 +62,13 @@ class Sample:
     source: tuple[tuple[int, int], ...] = ()
     images: Images | None = None
     rows: Tensor | None = None
+
+    def at(self, chosen: Tensor) -> "Sample":
+        """The same of some loose pixels. Args: chosen: (Q,) of the sample's points."""
+        assert self.rows is not None
+        lit = (chosen[:, None] * self.lights + torch.arange(self.lights, device=chosen.device)).flatten()
+        rows = self.rows[chosen.to(self.rows.device)]
+        return Sample(self.points[chosen], self.normals[chosen], self.lights, self.transport[lit], rows=rows)
 
 
 class Sampler(Protocol):

@@ -21,8 +21,9 @@ from stages.core.schemas import MATERIAL
 from stages.core.shading import Material, shade
 from stages.distill import checkpoint, regularizers, schedule
 from stages.distill.checkpoint import State, step_generator
-from stages.distill.gauss_newton import material_gradient
+from stages.distill.gauss_newton import logit_gradient, proposal
 from stages.distill.guidance.base import Budget, Guidance, Response
+from stages.distill.leaps import UNTIL, leaps
 from stages.distill.optimizer import RowAdam
 from stages.distill.options import DistillOptions
 from stages.distill.preview import write_preview
@@ -176,22 +177,31 @@ def optimisation_step(run: Run) -> float:
     if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
-        _follow(response, sample, radiance, material, _regularizers(material, nearby, run), run.progress)
+        losses = _regularizers(material, nearby, response, run)
+        if response.curvature is None:
+            torch.autograd.backward([radiance, *losses], [response.gradient, *[None] * len(losses)])
+        else:
+            values = torch.cat([material.albedo, material.roughness[:, None], material.metallic[:, None]], 1)  # (P, 5)
+            goal = _goal(run, response, sample, values.detach(), generator)
+            torch.autograd.backward([values, *losses], [logit_gradient(values.detach(), goal), *[None] * len(losses)])
     with clock("optimiser"):
         state.optimizer.step(run.budget.learning_rate * schedule.learning_rate(run.progress))
     return response.loss
 
 
-def _follow(
-    response: Response, sample: Sample, radiance: Tensor, material: Material, losses: list[Tensor], progress: float
-) -> None:
-    """Give the field's parameters the gradients that a response and losses on the material call for."""
-    if response.curvature is None:
-        torch.autograd.backward([radiance, *losses], [response.gradient, *[None] * len(losses)])
-        return
-    values = (material.albedo, material.roughness, material.metallic)
-    gradients = material_gradient(sample.transport, Material(*(t.detach() for t in values)), response, progress)
-    torch.autograd.backward([*values, *losses], [*gradients, *[None] * len(losses)])
+def _goal(run: Run, response: Response, sample: Sample, values: Tensor, generator: torch.Generator) -> Tensor:
+    """Where a response of least squares sends the material of every point: (P, 5)."""
+    material = Material(values[:, :3], values[:, 3], values[:, 4])
+    goal = (values + proposal(sample.transport, material, response, run.progress)).clamp(0.0, 1.0)
+    if run.progress >= UNTIL:
+        return goal
+
+    def ask(radiance: Tensor, part: Sample) -> Response:
+        return run.guidance.respond(radiance, part, run.progress, generator)
+
+    rows, elsewhere = leaps(sample, values, response, ask, run.progress, generator)
+    goal[rows] = elsewhere
+    return goal
 
 
 def _materials(
@@ -206,13 +216,15 @@ def _materials(
     return Material(*here), Material(*nearby)
 
 
-def _regularizers(material: Material, nearby: Material | None, run: Run) -> list[Tensor]:
+def _regularizers(material: Material, nearby: Material | None, response: Response, run: Run) -> list[Tensor]:
     """The weighted losses on the material itself."""
     options, expected = run.options, run.guidance.start
     losses = []
     if expected is not None:  # words decide what a picture leaves open; a known target needs no such help
         losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(material.metallic))
         losses.append(options.anchor * regularizers.distance_of_means(material, expected))
+    if response.seen is not None:
+        losses.append(options.seen * regularizers.distance_to(material, response.seen))
     if nearby is not None:
         losses.append(options.smoothness * regularizers.smoothness(material, nearby))
     return losses

@@ -56,7 +56,7 @@ class Prior:
         k = prior.exposure(lights, mask)
         conditions = prior.prepare(depth, normal, mask, k * lights)
         x0 = prior.profile_tone(k * radiance)
-        eps = prior.predict_noise(x_t, t, conditions, prior.embed(["gold"]).expand(len(x_t)))
+        eps, material = prior.denoise(x_t, t, conditions, prior.embed(["gold"]).expand(len(x_t)))
     """
 
     network: PriorNetwork
@@ -90,25 +90,22 @@ class Prior:
         flags = (torch.full((len(conditions),), flag, device=conditions.device) for flag in (geometry, light))
         return profile.drop(conditions, *flags)
 
-    def predict_noise(self, x_t: Tensor, t: Tensor, conditions: Tensor | None, text: TextEmbedding) -> Tensor:
-        """The noise in x_t.
+    def denoise(
+        self, x_t: Tensor, t: Tensor, conditions: Tensor | None, text: TextEmbedding
+    ) -> tuple[Tensor, Tensor]:
+        """The noise in x_t, and the material that the model takes each pixel for.
 
         Args:
             x_t: (B, 3, S, S). t: (B,) long, 0 ... 999. conditions: (B, 22, S, S), as `prepare` and `drop` return
             them, or None. text: of B prompts.
         Returns:
-            (B, 3, S, S) float32. No gradient is kept.
+            (B, 3, S, S) float32; sRGB albedo, roughness and metallic in (0, 1), (B, 5, S, S) float32. No gradient is kept.
         """
-        return diffusion.noise_from_velocity(self.alpha_bar, x_t, self.predict(x_t, t, conditions, text)[0], t)
-
-    def predict(
-        self, x_t: Tensor, t: Tensor, conditions: Tensor | None, text: TextEmbedding
-    ) -> tuple[Tensor, Tensor]:
-        """v (B, 3, S, S), and sRGB albedo, roughness and metallic of each pixel (B, 5, S, S), in (0, 1); float32."""
         given = self.no_conditions(len(x_t)) if conditions is None else conditions
         a = diffusion.per_image(self.alpha_bar, t)
         with torch.no_grad(), torch.autocast(self.device.type, torch.bfloat16):
-            return self.network.denoiser(x_t, t, a, given, text)
+            v, material = self.network.denoiser(x_t, t, a, given, text)
+        return diffusion.noise_from_velocity(self.alpha_bar, x_t, v, t), material
 
     def sample(
         self, conditions: Tensor, prompts: list[str], generator: torch.Generator, steps: int = 25, guidance: float = 3.0
@@ -119,7 +116,7 @@ class Prior:
         both = torch.cat([conditions, conditions])
 
         def predict(x_t: Tensor, t: Tensor) -> Tensor:
-            wanted, free = self.predict_noise(x_t.repeat(2, 1, 1, 1), t.repeat(2), both, text).chunk(2)
+            wanted, free = self.denoise(x_t.repeat(2, 1, 1, 1), t.repeat(2), both, text)[0].chunk(2)
             return free + guidance * (wanted - free)
 
         return diffusion.ddim(self.alpha_bar, predict, noise.to(self.device), steps)

@@ -6,6 +6,7 @@ Runs are kept: the same call continues where it was stopped. Written: prior.csv,
 for each measure with its 95 % interval and target; prior.png, a picture of each result under its prompt.
 """
 
+import functools
 import itertools
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -285,16 +286,21 @@ def loose_points(baked: Baked, rows: NDArray[np.int64]) -> GBuffer:
 
 def relight(baked: Baked, points: GBuffer, maps: NDArray[np.float32], wanted: NDArray) -> float:
     """Tone-mapped RMSE, percent, of the points' pictures against those of the ideal, even material."""
-    light = preview_light()
-    turned = [Environment(f"{light.name}_{i}", np.roll(light.radiance, int(turn * light.radiance.shape[1]), 1))
-              for i, turn in enumerate(TURNS)]  # fmt: skip
     found = torch.from_numpy(maps)
     ideal = torch.tensor([*srgb_decode(wanted[:3]).tolist(), *wanted[3:].tolist()]).float().expand(len(maps), 5)
     squares = []
-    for transport in light_transport(baked.scene, points, turned, RAYS, 0):
+    for transport in light_transport(baked.scene, points, new_lights(), RAYS, 0):
         a, b = (reinhard(shade(_float(transport), _material(values))) for values in (found, ideal))
         squares.append(float((a - b).square().mean()))
     return float(np.sqrt(np.mean(squares))) * 100
+
+
+@functools.cache
+def new_lights() -> list[Environment]:
+    """Environments that nothing was trained on."""
+    light = preview_light()
+    width = light.radiance.shape[1]
+    return [Environment(f"{light.name}_{i}", np.roll(light.radiance, int(t * width), 1)) for i, t in enumerate(TURNS)]
 
 
 def _float(transport: Transport) -> Transport:

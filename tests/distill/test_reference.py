@@ -136,3 +136,11 @@ def test_bad_models_are_one_line_errors(tmp_path: Path) -> None:
     bare.write_bytes(trimesh.Scene(trimesh.creation.icosphere(subdivisions=1)).export(file_type="glb"))
     with pytest.raises(InputError, match="no metallic-roughness material"):
         ReferenceAsset(bare, IDENTITY)
+
+
+def test_some_points_of_a_sample_are_those_of_the_pool(conditions: Path) -> None:
+    whole = pool(conditions)
+    sample, chosen = whole.draw(torch.Generator().manual_seed(1)), torch.tensor([5, 2, 9])
+    part, alone = sample.at(chosen), whole.at(sample.rows[chosen])  # type: ignore[index]
+    assert torch.equal(part.points, alone.points) and torch.equal(part.normals, alone.normals)
+    assert all(torch.equal(getattr(part.transport, n), getattr(alone.transport, n)) for n in ("E", "A", "B", "cosine"))

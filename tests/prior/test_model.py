@@ -49,7 +49,7 @@ def test_identity_says_where_the_weights_come_from(prior: Prior) -> None:
 def test_noise_prediction_has_not_changed(prior: Prior, golden) -> None:
     noise, conditions = view(3)
     prompts = prior.embed(["polished gold", "red plastic", ""])
-    eps = prior.predict_noise(noise, torch.tensor([100, 400, 800]), conditions, prompts)
+    eps = prior.denoise(noise, torch.tensor([100, 400, 800]), conditions, prompts)[0]
     expected = prior.expected_material(["polished gold", "red plastic", "oak wood"])
     arrays = {"eps": eps[:, :, ::8, ::8].numpy(), "expected": expected.numpy()}
     golden.check("prior/predict_noise", arrays, atol=0.06)  # bfloat16 differs between processors
@@ -59,24 +59,24 @@ def test_same_call_same_bytes(prior: Prior) -> None:
     noise, conditions = view(2)
     t, text = torch.tensor([200, 600]), prior.embed(["oak wood", "steel"])
     assert torch.equal(
-        prior.predict_noise(noise, t, conditions, text), prior.predict_noise(noise, t, conditions, text)
+        prior.denoise(noise, t, conditions, text)[0], prior.denoise(noise, t, conditions, text)[0]
     )
 
 
 def test_conditions_may_be_missing(prior: Prior) -> None:
     noise, conditions = view(2)
     t, text = torch.tensor([200, 600]), prior.embed(["oak wood", "steel"])
-    none = prior.predict_noise(noise, t, None, text)
-    dropped = prior.predict_noise(noise, t, prior.drop(conditions, geometry=True, light=True), text)
+    none = prior.denoise(noise, t, None, text)[0]
+    dropped = prior.denoise(noise, t, prior.drop(conditions, geometry=True, light=True), text)[0]
     assert torch.equal(none, dropped)
-    assert not torch.equal(none, prior.predict_noise(noise, t, conditions, text))
+    assert not torch.equal(none, prior.denoise(noise, t, conditions, text)[0])
     assert torch.isfinite(none).all()
 
 
 def test_the_prompt_steers_the_prediction(prior: Prior) -> None:
     noise, conditions = view(1)
     t = torch.tensor([700])
-    surface = {p: prior.predict(noise, t, conditions, prior.embed([p]))[1] for p in ("polished gold", "blue fabric")}
+    surface = {p: prior.denoise(noise, t, conditions, prior.embed([p]))[1] for p in ("polished gold", "blue fabric")}
     inside = conditions[:, :1] > 0
     metallic = {p: float(m[:, 4:][inside].mean()) for p, m in surface.items()}
     assert metallic["polished gold"] > 0.6 and metallic["blue fabric"] < 0.4
