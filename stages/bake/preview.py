@@ -44,7 +44,7 @@ EXPOSURE = 0.8
 
 COLUMNS = 4
 
-RAYS = Quality(lobe=64, light=12)
+RAYS = Quality(lobe=32, light=12, extra=False)
 """Rays that a pixel traces: a little grain in the shadows stays."""
 
 TEXT_HEIGHT = 14
