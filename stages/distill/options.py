@@ -29,7 +29,6 @@ class DistillOptions:
     eta1: float | None = None  # weight of the positive prediction, Eq. 7; None: what loss and guidance call for
     eta2: tuple[float, float] | None = None  # of the negative one, at the start and from two thirds on; None: likewise
     posterior: float | None = None  # share of (eps_pos - noise) added to the classifier score; None: likewise
-    seen: float = 0.2  # weight of the distance to the material that the model takes each pixel for
     anchor: float = 0.5  # weight of the distance between the mean material and what the words alone call for
     given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
     lights: str = "all"  # environments that steps are lit by: "all", or "one", the first

@@ -29,22 +29,13 @@ def bimodality(metallic: Tensor) -> Tensor:
 
 
 def distance_of_means(material: Material, expected: Tensor) -> Tensor:
-    """Squared distance between the points' mean material and an expected one. Differentiable in: material.
+    """Squared distance between the points' mean material and an expected one, colours as sRGB, in which a dark one counts too.
 
-    The mean alone is held, so that a composition may still differ from place to place.
+    The mean alone is held, so that a composition may still differ from place to place. Differentiable in: material.
 
     Args:
         expected: (5,) linear albedo, roughness, metallic.
     """
-    mean = torch.cat([material.albedo.mean(0), material.roughness.mean()[None], material.metallic.mean()[None]])
-    return (mean - expected.to(mean)).square().sum()
-
-
-def distance_to(material: Material, seen: Tensor) -> Tensor:
-    """Squared distance to a material that each point is taken for, mean over points. Differentiable in: material.
-
-    Args:
-        seen: (P, 5) sRGB albedo, roughness, metallic.
-    """
-    values = torch.cat([srgb_encode(material.albedo), material.roughness[:, None], material.metallic[:, None]], 1)
-    return (values - seen).square().sum(1).mean()
+    albedo = srgb_encode(material.albedo).mean(0) - srgb_encode(expected[:3].to(material.albedo))
+    rest = torch.stack([material.roughness.mean(), material.metallic.mean()]) - expected[3:].to(material.roughness)
+    return albedo.square().sum() + rest.square().sum()

@@ -42,10 +42,6 @@ class Images:
         flat = values.new_zeros(self.count * self.size**2, values.shape[1]).index_copy(0, self.pixel, values)
         return flat.view(self.count, self.size, self.size, -1).permute(0, 3, 1, 2)
 
-    def pick(self, images: Tensor) -> Tensor:
-        """The points' values (P, C) in images (B, C, S, S)."""
-        return images.permute(0, 2, 3, 1).flatten(0, 2).index_select(0, self.pixel)
-
 
 @dataclass(frozen=True)
 class Sample:

@@ -177,7 +177,7 @@ def optimisation_step(run: Run) -> float:
     if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
-        losses = _regularizers(material, nearby, response, run)
+        losses = _regularizers(material, nearby, run)
         if response.curvature is None:
             torch.autograd.backward([radiance, *losses], [response.gradient, *[None] * len(losses)])
         else:
@@ -216,15 +216,13 @@ def _materials(
     return Material(*here), Material(*nearby)
 
 
-def _regularizers(material: Material, nearby: Material | None, response: Response, run: Run) -> list[Tensor]:
+def _regularizers(material: Material, nearby: Material | None, run: Run) -> list[Tensor]:
     """The weighted losses on the material itself."""
     options, expected = run.options, run.guidance.start
     losses = []
     if expected is not None:  # words decide what a picture leaves open; a known target needs no such help
         losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(material.metallic))
         losses.append(options.anchor * regularizers.distance_of_means(material, expected))
-    if response.seen is not None:
-        losses.append(options.seen * regularizers.distance_to(material, response.seen))
     if nearby is not None:
         losses.append(options.smoothness * regularizers.smoothness(material, nearby))
     return losses

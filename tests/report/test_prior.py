@@ -59,7 +59,9 @@ def test_regions_are_told_by_height() -> None:
     assert right(np.broadcast_to(oak.row(), (101, 5)).astype(np.float32)) == 0.5
 
 
-def test_small_report(tmp_path: Path) -> None:
+def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, less in (("TEXTURE", 512), ("PREVIEW", 64), ("POINTS", 300)):
+        monkeypatch.setattr(prior, name, less)
     ball = tmp_path / "ball.obj"
     trimesh.creation.icosphere(subdivisions=2).export(ball)
     options = PriorReportOptions(mesh=(str(ball),), seeds=1, prompts=1, steps=2, views=1)

@@ -30,15 +30,13 @@ class Response:
     gradient: (P L, 3) of its loss, scaled to a mean over pixels. loss: a number for the curve. curvature: (P L, 3) second
     derivative of the loss by each value, scaled alike, where the loss is one of least squares: the material is then
     stepped by `stages.distill.gauss_newton`. plain: with a curvature, how far a step takes metallic down and roughness up
-    where the pictures leave them open. seen: (P, 5) sRGB albedo, roughness and metallic that a model which knows materials
-    takes the points for.
+    where the pictures leave them open.
     """
 
     gradient: Tensor
     loss: float
     curvature: Tensor | None = None
     plain: float = 0.0
-    seen: Tensor | None = None
 
 
 class Guidance(Protocol):

@@ -1,9 +1,8 @@
 """Guidance by the embedded diffusion model: Classifier Score Distillation under geometry and light conditions.
 
 Rendered crops and their light maps are exposed alike, put through the model's tone curve, and noised to a random
-diffusion time; the score moves the picture. The same call says what material the model takes each pixel for, given the
-prompt; that pulls on the material itself, of which pictures leave much open. All three branches (prompt, no prompt, negative
-prompt) get the same conditions, or colours shift.
+diffusion time; the score moves the picture. All three branches (prompt, no prompt, negative prompt) get the same
+conditions, or colours shift.
 """
 
 from typing import Any
@@ -50,18 +49,14 @@ class PriorGuidance:
             conditions = prior.drop(conditions, geometry=given != "geometry", light=given != "light")
         leaf = radiance.detach().requires_grad_()
         picture = prior.profile_tone(exposure * images.paint(leaf))  # (B, 3, S, S)
-        materials = []
 
         def predict(x_t: Tensor, t: Tensor, branches: int) -> Tensor:
-            noise, material = prior.denoise(x_t, t, conditions.repeat(branches, 1, 1, 1), self._text(images, branches))
-            materials.append(material[: images.count])  # of the prompt's branch
-            return noise
+            return prior.denoise(x_t, t, conditions.repeat(branches, 1, 1, 1), self._text(images, branches))[0]
 
         score = distillation_score(predict, picture.detach(), prior.alpha_bar, self.weights, progress, generator)
         (gradient,) = torch.autograd.grad(picture, leaf, score / len(radiance))
         on_object = images.paint(torch.ones_like(radiance[:, :1]))
-        seen = images.pick(torch.cat(materials))
-        return Response(gradient, float((score * on_object).square().mean().sqrt()), seen=seen)
+        return Response(gradient, float((score * on_object).square().mean().sqrt()))
 
     def _conditions(self, images: Images, sample: Sample) -> tuple[Tensor, Tensor]:
         """Exposure (B, 1, 1, 1) and condition channels (B, 22, S, S)."""
