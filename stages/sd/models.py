@@ -66,20 +66,14 @@ class StableDiffusion:
         return {"name": "stable-diffusion", **sources, "weights": weights, "prediction": self.files.prediction}
 
     def embed(self, prompts: list[str]) -> Tensor:
-        """Text embeddings (N, T, D) of N prompts; "" is the null prompt. The text encoder is loaded for this call alone."""
-        from transformers import CLIPTextModel, CLIPTokenizer
+        """Text embeddings (N, T, D) of N prompts; "" is the null prompt. The text encoder is loaded for this call alone.
 
-        folder, longest = self.files.base / "tokenizer", self.files.text_encoder["max_position_embeddings"]
-        try:
-            tokenizer = CLIPTokenizer.from_pretrained(folder, local_files_only=True)
-        except Exception as error:  # whatever a malformed file makes it trip over
-            raise InputError(f"{folder}: not a readable tokenizer ({one_line(error)}); get it again") from error
-        tokens = [tokenizer(prompt, padding="max_length", max_length=longest).input_ids for prompt in prompts]
-        if long := [prompt for prompt, row in zip(prompts, tokens, strict=True) if len(row) > longest]:
-            raise InputError(f'--prompt "{long[0][:40]}…": longer than the {longest - 2} tokens that are read; shorten it')
-        encoder = _load(CLIPTextModel, self.files.text_encoder)
-        with torch.no_grad():
-            return encoder(torch.tensor(tokens)).last_hidden_state.to(self.device, self.denoiser.unet.dtype)
+        Raises: InputError when a prompt is too long to be read whole.
+        """
+        text = load_text_encoder(self.files)
+        if long := [prompt for prompt in prompts if len(text.tokenizer(prompt).input_ids) > text.longest]:
+            raise InputError(f'--prompt "{long[0][:40]}…": longer than the {text.longest - 2} tokens that are read; shorten it')
+        return text.embed(prompts).to(self.device, self.denoiser.unet.dtype)
 
     def encode(self, picture: Tensor) -> Tensor:
         """Latents of pictures: the mean of what the encoder holds likely.
@@ -116,13 +110,42 @@ class StableDiffusion:
         return predicted
 
 
+@dataclass(frozen=True)
+class TextEncoder:
+    """CLIP's tokenizer and text encoder. longest: tokens that are read, the first and the last one included."""
+
+    tokenizer: Any
+    encoder: Any
+    longest: int
+
+    def embed(self, prompts: list[str]) -> Tensor:
+        """Text embeddings (N, T, D) float32 of N prompts, each cut to `longest`."""
+        cut = {"padding": "max_length", "truncation": True, "max_length": self.longest}
+        tokens = torch.tensor([self.tokenizer(prompt, **cut).input_ids for prompt in prompts])
+        with torch.no_grad():
+            return self.encoder(tokens.to(self.encoder.device)).last_hidden_state
+
+
+def load_text_encoder(files: ModelFiles) -> TextEncoder:
+    """On the CPU. Raises: InputError when a file is damaged."""
+    from transformers import CLIPTextModel, CLIPTokenizer
+
+    folder = files.base / "tokenizer"
+    try:
+        tokenizer = CLIPTokenizer.from_pretrained(folder, local_files_only=True)
+    except Exception as error:  # whatever a malformed file makes it trip over
+        raise InputError(f"{folder}: not a readable tokenizer ({one_line(error)}); get it again") from error
+    encoder = load_network(CLIPTextModel, files.text_encoder)
+    return TextEncoder(tokenizer, encoder, files.text_encoder["max_position_embeddings"])
+
+
 def load_models(files: ModelFiles, device: torch.device, plan: Plan) -> StableDiffusion:
     """The models, ready for inference on a device. Raises: InputError when a file is damaged or of another network."""
-    from diffusers import AutoencoderKL, ControlNetModel, DDPMScheduler, UNet2DConditionModel
+    from diffusers import AutoencoderKL, ControlNetModel, UNet2DConditionModel
 
-    _be_quiet()
-    unet, controlnet = _load(UNet2DConditionModel, files.unet), _load(ControlNetModel, files.controlnet)
-    vae = _load(AutoencoderKL, files.vae)
+    be_quiet()
+    unet, controlnet = load_network(UNet2DConditionModel, files.unet), load_network(ControlNetModel, files.controlnet)
+    vae = load_network(AutoencoderKL, files.vae)
     del vae.decoder
     if device.type == "cuda":
         unet, controlnet = unet.half(), controlnet.half()
@@ -138,12 +161,28 @@ def load_models(files: ModelFiles, device: torch.device, plan: Plan) -> StableDi
     else:
         denoiser.to(device)
         _compile(denoiser, device)
+    return StableDiffusion(files, denoiser, vae.to(device), _alpha_bar(files, device), files.hashes(), device, plan)
+
+
+def load_for_training(files: ModelFiles, device: torch.device, dtype: torch.dtype) -> StableDiffusion:
+    """The models with a ControlNet that learns, in float32; UNet and VAE are frozen, in a dtype. Raises: InputError."""
+    from diffusers import AutoencoderKL, ControlNetModel, UNet2DConditionModel
+
+    be_quiet()
+    unet, vae = load_network(UNet2DConditionModel, files.unet), load_network(AutoencoderKL, files.vae)
+    controlnet = load_network(ControlNetModel, files.controlnet).train().requires_grad_()
+    denoiser = Denoiser(unet.to(dtype), controlnet).to(device)
+    return StableDiffusion(files, denoiser, vae.to(device, dtype), _alpha_bar(files, device), files.hashes(), device, Plan())
+
+
+def _alpha_bar(files: ModelFiles, device: torch.device) -> Tensor:
+    from diffusers import DDPMScheduler
+
     scheduler = DDPMScheduler.from_pretrained(files.base / "scheduler", local_files_only=True)
-    alpha_bar = scheduler.alphas_cumprod.to(device)
-    return StableDiffusion(files, denoiser, vae.to(device), alpha_bar, files.hashes(), device, plan)
+    return scheduler.alphas_cumprod.to(device)
 
 
-def _load(kind: Any, network: Network) -> Any:
+def load_network(kind: Any, network: Network) -> Any:
     """A network with the weights of its file, all of them, in float32 on the CPU."""
     name = network.weights.name
     try:
@@ -184,7 +223,7 @@ def _compile(denoiser: Denoiser, device: torch.device) -> None:
                 module.compile()
 
 
-def _be_quiet() -> None:
+def be_quiet() -> None:
     """Keep the libraries' remarks and progress bars off the terminal; errors come as exceptions."""
     import diffusers.utils.logging
     import transformers.utils.logging
