@@ -19,6 +19,10 @@ from stages.core import diffusion
 from stages.core.errors import InputError, one_line
 from stages.sd.files import ModelFiles, Network
 from stages.sd.memory import Plan
+from stages.sd.profile import CHANNELS
+
+EMBEDDING = (16, 32, 96, 256)
+"""Widths of a ControlNet's condition encoder, level by level: diffusers' default."""
 
 
 class Denoiser(nn.Module):
@@ -32,7 +36,7 @@ class Denoiser(nn.Module):
         self.unet, self.controlnet = unet, controlnet
 
     def forward(self, x_t: Tensor, t: Tensor, text: Tensor, conditions: Tensor | None, scale: Tensor) -> Tensor:
-        """What the model predicts; arguments as in `StableDiffusion.predict_noise`, scale (), all in the networks' dtype."""
+        """What the model predicts; arguments as in `StableDiffusion.predict_noise`, scale (), all in the UNet's dtype."""
         if conditions is None:
             return self.unet(x_t, t, text, return_dict=False)[0]
         down, middle = self.controlnet(x_t, t, text, conditions, return_dict=False)
@@ -40,8 +44,8 @@ class Denoiser(nn.Module):
             x_t,
             t,
             text,
-            down_block_additional_residuals=[scale * residual for residual in down],
-            mid_block_additional_residual=scale * middle,
+            down_block_additional_residuals=[(scale * residual).to(x_t.dtype) for residual in down],
+            mid_block_additional_residual=(scale * middle).to(x_t.dtype),
             return_dict=False,
         )[0]
 
@@ -85,6 +89,11 @@ class StableDiffusion:
         """
         posterior = self.vae.encode((2 * picture - 1).to(self.vae.dtype)).latent_dist
         return self.vae.config.scaling_factor * posterior.mode().float()
+
+    def decode(self, latents: Tensor) -> Tensor:
+        """Pictures (B, 3, H, W) in [0, 1] of latents; of models loaded for training, whose VAE is whole."""
+        decoded = self.vae.decode((latents / self.vae.config.scaling_factor).to(self.vae.dtype)).sample
+        return (decoded.float() / 2 + 0.5).clamp(0, 1)
 
     def predict_noise(self, x_t: Tensor, t: Tensor, text: Tensor, conditions: Tensor | None, scale: float) -> Tensor:
         """The noise in x_t.
@@ -165,14 +174,37 @@ def load_models(files: ModelFiles, device: torch.device, plan: Plan) -> StableDi
 
 
 def load_for_training(files: ModelFiles, device: torch.device, dtype: torch.dtype) -> StableDiffusion:
-    """The models with a ControlNet that learns, in float32; UNet and VAE are frozen, in a dtype. Raises: InputError."""
+    """The models with a ControlNet that learns, in float32; the rest is frozen, in a dtype, the VAE never in half precision.
+
+    Raises: InputError when a file is damaged or of another network.
+    """
     from diffusers import AutoencoderKL, ControlNetModel, UNet2DConditionModel
 
     be_quiet()
     unet, vae = load_network(UNet2DConditionModel, files.unet), load_network(AutoencoderKL, files.vae)
     controlnet = load_network(ControlNetModel, files.controlnet).train().requires_grad_()
     denoiser = Denoiser(unet.to(dtype), controlnet).to(device)
-    return StableDiffusion(files, denoiser, vae.to(device, dtype), _alpha_bar(files, device), files.hashes(), device, Plan())
+    vae.to(device, torch.float32 if dtype == torch.float16 else dtype)
+    return StableDiffusion(files, denoiser, vae, _alpha_bar(files, device), files.hashes(), device, Plan())
+
+
+def write_untrained_controlnet(folder: Path, unet: Network, vae: Network, seed: int) -> None:
+    """Write a ControlNet for 22 channels that begins as a copy of the UNet's encoder and as yet changes nothing.
+
+    Source: Zhang et al. 2023, "Adding Conditional Control to Text-to-Image Diffusion Models", Section 3.
+    """
+    from diffusers import ControlNetModel, UNet2DConditionModel
+
+    be_quiet()
+    levels = len(vae["block_out_channels"])  # conditions shrink as pictures do
+    with torch.random.fork_rng():  # nn.Module initialisation knows only the global generator, which is put back
+        torch.default_generator.manual_seed(seed)
+        controlnet = ControlNetModel.from_unet(
+            load_network(UNet2DConditionModel, unet),
+            conditioning_channels=CHANNELS,
+            conditioning_embedding_out_channels=EMBEDDING[:levels],
+        )
+    controlnet.save_pretrained(folder)
 
 
 def _alpha_bar(files: ModelFiles, device: torch.device) -> Tensor:

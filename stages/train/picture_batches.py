@@ -5,6 +5,7 @@ seed and number alone, so a run learns the same however its batches are divided 
 """
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 
 import torch
@@ -17,6 +18,8 @@ from stages.core.errors import ArtifactError
 from stages.sd import profile
 from stages.train.options import TrainControlnetOptions
 from stages.train.pictures import OBJECT, VIEW, paint
+
+TENSORS = ("picture", "conditions", "t", "noise")
 
 
 class Pictures:
@@ -56,24 +59,45 @@ class Pictures:
         return paint(picture, mask, 1.0), paint(channels, mask, profile.background()), caption
 
 
+@dataclass(frozen=True)
+class Draw:
+    """picture: (3, S, S). conditions: (22, S, S). t: () diffusion time. noise: (C, h, w), of the latents."""
+
+    picture: Tensor
+    conditions: Tensor
+    caption: str
+    t: Tensor
+    noise: Tensor
+
+
+@dataclass(frozen=True)
+class Batch:
+    """B draws: as those, with a first axis B."""
+
+    picture: Tensor
+    conditions: Tensor
+    captions: list[str]
+    t: Tensor
+    noise: Tensor
+
+
 class Draws(torch.utils.data.Dataset):
     """Draw number i of a run. Args: latent: shape (C, h, w) of a picture's latents."""
 
     def __init__(self, pictures: Pictures, latent: tuple[int, int, int], options: TrainControlnetOptions) -> None:
         self.pictures, self.latent, self.options = pictures, latent, options
 
-    def __getitem__(self, number: int) -> tuple[Tensor, Tensor, str, Tensor, Tensor]:
-        """Picture, conditions, caption, diffusion time () and noise (C, h, w)."""
+    def __getitem__(self, number: int) -> Draw:
         options, rng = self.options, default_rng([self.options.seed, number])
         picture, conditions, caption = self.pictures[int(rng.integers(len(self.pictures)))]
         no_prompt, no_geometry, no_light = rng.random(3) < (options.no_prompt, options.no_geometry, options.no_light)
         conditions = profile.without(conditions[None], geometry=no_geometry, light=no_light)[0]
         t = torch.tensor(int(rng.integers(diffusion.STEPS)))
         noise = torch.from_numpy(rng.standard_normal(self.latent, "f4"))
-        return picture, conditions, "" if no_prompt else caption, t, noise
+        return Draw(picture, conditions, "" if no_prompt else caption, t, noise)
 
 
-def collate(draws: list[tuple[Tensor, Tensor, str, Tensor, Tensor]]) -> tuple[Tensor, Tensor, list[str], Tensor, Tensor]:
-    """Draws as a batch."""
-    pictures, conditions, captions, t, noise = zip(*draws, strict=True)
-    return torch.stack(pictures), torch.stack(conditions), list(captions), torch.stack(t), torch.stack(noise)
+def batch_of(draws: list[Draw]) -> Batch:
+    """Draws together."""
+    picture, conditions, t, noise = (torch.stack([getattr(d, name) for d in draws]) for name in TENSORS)
+    return Batch(picture, conditions, [d.caption for d in draws], t, noise)
