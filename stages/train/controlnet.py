@@ -170,7 +170,7 @@ def loader(accelerator: Any, draws: Draws, step: int) -> Iterator[Batch]:
     options, devices, rank = draws.options, accelerator.num_processes, accelerator.process_index
     count = options.at_once
     first, last = (s * options.batch // count for s in (step, options.steps))
-    numbers = [list(range(i * count, (i + 1) * count)) for i in range(first + rank, last, devices)]
+    numbers = (list(range(i * count, (i + 1) * count)) for i in range(first + rank, last, devices))
     batches = torch.utils.data.DataLoader(
         draws, batch_sampler=numbers, num_workers=options.workers, collate_fn=batch_of, pin_memory=torch.cuda.is_available()
     )

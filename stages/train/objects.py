@@ -21,6 +21,7 @@ from stages.light.textured_model import TexturedModel
 from stages.prep.options import PrepOptions
 from stages.prep.read_gltf import read_gltf
 from stages.prep.repair import repair
+from stages.prep.source import Source
 from stages.prep.stage import oriented
 
 UNFIT = {
@@ -81,19 +82,26 @@ def read_object(path: Path, entry: Entry) -> TrainingObject:
     for reason, pattern in UNFIT.items():
         if re.search(pattern, model_file):
             raise InputError(f"{path}: {reason}")
-    source, chosen = read_gltf(path), PrepOptions()
+    source = read_gltf(path)
     if others := sorted(source.skipped.keys() & {"points", "lines"}):
         raise InputError(f"{path}: holds {' and '.join(others)}")
-    working = repair(source, chosen.up, chosen.weld_tolerance, path)
-    if len(working.triangles) < FEWEST:
-        raise InputError(f"{path}: is too simple, {len(working.triangles)} triangles")
-    if thickness(working.vertices[np.unique(working.triangles)]) < THINNEST:
+    thing = place(path, source)
+    if (count := len(thing.scene.triangles)) < FEWEST:
+        raise InputError(f"{path}: is too simple, {count} triangles")
+    if thickness(thing.scene.vertices[np.unique(thing.scene.triangles)]) < THINNEST:
         raise InputError(f"{path}: is a single plane")
+    return thing
+
+
+def place(path: Path, source: Source) -> TrainingObject:
+    """An object in the world frame, mended as `prep` does. Raises: InputError."""
+    chosen = PrepOptions()
+    working = repair(source, chosen.up, chosen.weld_tolerance, path)
     normals, _ = oriented(source, working, chosen.crease_angle)
     return TrainingObject(Scene(working.vertices, working.triangles, normals), TexturedModel(path, working.to_world))
 
 
-def thickness(points: NDArray[np.float64]) -> float:
+def thickness(points: NDArray) -> float:
     """Extent along the direction in which the points (V, 3) spread least."""
     across = np.linalg.eigh(np.cov(points.T))[1][:, 0]
     return float(np.ptp(points @ across))
