@@ -14,7 +14,7 @@ from trimesh.visual.material import PBRMaterial
 
 from stages.core.artifact import reason
 from stages.core.color import srgb_decode
-from stages.core.errors import InputError
+from stages.core.errors import InputError, one_line
 from stages.core.frames import transform_points
 from stages.light.scene import Scene
 
@@ -119,14 +119,14 @@ def _meshes(path: Path) -> list[trimesh.Trimesh]:
         raise InputError(f"{path}: expected a .glb or .gltf model with metallic-roughness textures")
     try:
         transformed = _EXTENSION in path.read_bytes()
-        scene = trimesh.load_scene(path)
+        parts = trimesh.load_scene(path).dump()
     except OSError as error:
         raise InputError(f"{path}: {reason(error)}") from error
     except Exception as error:  # the loader raises whatever a malformed file makes it trip over
-        raise InputError(f"{path}: not a readable glTF model ({str(error).splitlines()[0][:120]})") from error
+        raise InputError(f"{path}: not a readable glTF model ({one_line(error)})") from error
     if transformed:
         raise InputError(f"{path}: uses {_EXTENSION.decode()}, which is not supported; export it without")
-    meshes = [mesh for mesh in scene.dump() if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
+    meshes = [mesh for mesh in parts if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]
     if not meshes:
         raise InputError(f"{path}: holds no triangles; expected a textured model")
     return meshes

@@ -74,6 +74,41 @@ class PicturesResult:
     made: int
 
 
+@dataclass(frozen=True)
+class Studio:
+    """What all objects are rendered with. lights: to draw from, none for random ones. hashes: of their files, by role."""
+
+    options: PicturesOptions
+    lights: list[Environment]
+    hashes: dict[str, str]
+    captioner: Captioner | None
+
+    @staticmethod
+    def of(options: PicturesOptions) -> "Studio":
+        """Read lights and captioner. Raises: InputError."""
+        lights, _, hashes = read_lights(options.env) if options.env else ([], {}, {})
+        return Studio(options, lights, hashes, Captioner(options.captioner) if options.captioner else None)
+
+    def request(self, file: Path, entry: Entry) -> Provenance:
+        """What an object's folder follows from; the captioner only where there is no caption."""
+        chosen = plain_options(self.options)
+        for name in ("captions", "shard", *(["captioner"] if entry.caption else [])):
+            del chosen[name]
+        asked = {**chosen, "caption": entry.caption, "tags": list(entry.tags)}
+        return Provenance(asked, self.options.seed, {"model": sha256_file(file), **self.hashes})
+
+    @property
+    def count(self) -> int:
+        """Environments of an object: as many as asked for, or all there are to draw from."""
+        return min(self.options.lights, len(self.lights) or self.options.lights)
+
+    def draw(self, rng: Generator) -> list[Environment]:
+        """The environments of an object."""
+        if not self.lights:
+            return [random_light(rng, f"light_{k}") for k in range(self.count)]
+        return [self.lights[k] for k in rng.permutation(len(self.lights))[: self.count]]
+
+
 def render_pictures(
     models: Path, out: Path, options: PicturesOptions, force: bool = False, progress: Progress = silent
 ) -> PicturesResult:
@@ -85,82 +120,51 @@ def render_pictures(
     if not files:
         raise InputError(f"{models}: no .glb files in it; expected a folder of textured models")
     part, parts = options.shard
-    entries, lights = read_captions(options.captions), read_lights(options.env) if options.env else ([], {}, {})
-    captioner = Captioner(options.captioner) if options.captioner else None
-    refused, objects, made = {}, 0, 0
     mine = files[part - 1 :: parts]
+    entries, studio = read_captions(options.captions), Studio.of(options)
+    refused, made = {}, 0
     for i, file in enumerate(mine):
         progress("objects", i, len(mine))
         name = file.relative_to(models).as_posix()
         entry = entries.get(name, Entry())
-        request = request_of(file, entry, options, lights[2])
-        folder = out / "objects" / Path(name).with_suffix("")
+        folder, request = out / "objects" / Path(name).with_suffix(""), studio.request(file, entry)
         done = None if force else peek(folder, OBJECT)
         if done is None or not done.same_request(request):
-            done, made = render_object(file, folder, entry, request, (options, lights[0], captioner)), made + 1
+            done, made = render_object(file, folder, entry, request, studio), made + 1
         if done.extra["refused"]:
             refused[name] = done.extra["refused"]
-        else:
-            objects += 1
-    pictures = objects * options.views * lights_of(options)
+    objects = len(mine) - len(refused)
+    pictures = objects * options.views * studio.count
     content = {"files": len(mine), "objects": objects, "pictures": pictures, "refused": refused}
     manifest = out / (MANIFEST if parts == 1 else f"manifest_{part}_of_{parts}.json")
     write_json(manifest, content)
     return PicturesResult(manifest, content, made)
 
 
-def request_of(file: Path, entry: Entry, options: PicturesOptions, lights: dict[str, str]) -> Provenance:
-    """What an object's folder follows from; the captioner only where there is no caption."""
-    chosen = plain_options(options)
-    for name in ("captions", "shard", *(["captioner"] if entry.caption else [])):
-        del chosen[name]
-    asked = {**chosen, "caption": entry.caption, "tags": list(entry.tags)}
-    return Provenance(asked, options.seed, {"model": sha256_file(file), **lights})
-
-
-def lights_of(options: PicturesOptions) -> int:
-    """Environments of an object: as many as asked for, or all there are to draw from."""
-    return min(options.lights, len(options.env) or options.lights)
-
-
-def render_object(
-    file: Path,
-    folder: Path,
-    entry: Entry,
-    request: Provenance,
-    tools: tuple[PicturesOptions, list[Environment], Captioner | None],
-) -> Provenance:
+def render_object(file: Path, folder: Path, entry: Entry, request: Provenance, studio: Studio) -> Provenance:
     """Write an object's folder, with its pictures or with the reason why it has none."""
-    options, lights, captioner = tools
+    options, captioner = studio.options, studio.captioner
     (folder / MANIFEST).unlink(missing_ok=True)
     caption, names, refused = entry.caption, [], ""
     try:
         if not (caption or captioner):
             raise InputError(f"{file}: has no caption")
         rng = default_rng([options.seed, int(request.inputs["model"][:12], 16)])
-        thing, chosen = read_object(file, entry), draw_lights(rng, options, lights)
-        cameras = place_cameras(
-            thing.scene.vertices.astype(np.float64), ConditionsOptions(views=options.views, seed=int(rng.integers(2**31)))
-        )
+        thing, lights = read_object(file, entry), studio.draw(rng)
+        chosen = ConditionsOptions(views=options.views, seed=int(rng.integers(2**31)))
+        cameras = place_cameras(thing.scene.vertices.astype(np.float64), chosen)
         for view, (c2w, fov_y) in enumerate(zip(cameras.c2w, cameras.fov_y, strict=True)):
-            arrays = render_view(thing, (c2w, float(fov_y)), chosen, options, int(rng.integers(2**31)))
+            arrays = render_view(thing, (c2w, float(fov_y)), lights, options, int(rng.integers(2**31)))
             if not caption and captioner:
                 caption = captioner.caption(whole(arrays))
             names.append(f"view_{view:02d}.npz")
             save_npz(folder / names[-1], VIEW, arrays, Provenance({}, None, {}))
     except InputError as error:
         names, refused = [], str(error).removeprefix(f"{file}: ")
-    extra = {"caption": caption, "lights": lights_of(options), "refused": refused}
+    extra = {"caption": caption, "lights": studio.count, "refused": refused}
     made = Provenance(request.options, request.seed, request.inputs, extra)
     write_manifest(folder, OBJECT, made, names)
     return made
-
-
-def draw_lights(rng: Generator, options: PicturesOptions, lights: list[Environment]) -> list[Environment]:
-    """The environments of an object."""
-    if not lights:
-        return [random_light(rng, f"light_{k}") for k in range(options.lights)]
-    return [lights[k] for k in rng.permutation(len(lights))[: lights_of(options)]]
 
 
 def render_view(

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from stages.core.color import srgb_decode
 from stages.core.errors import InputError
@@ -48,3 +49,16 @@ def test_bad_models_are_one_line_errors(tmp_path: Path) -> None:
     bare.write_bytes(trimesh.Scene(trimesh.creation.icosphere(subdivisions=1)).export(file_type="glb"))
     with pytest.raises(InputError, match="no metallic-roughness material"):
         TexturedModel(bare, IDENTITY)
+
+
+def test_a_damaged_texture_is_a_one_line_error(tmp_path: Path) -> None:
+    noise = np.random.default_rng(0).integers(0, 256, (64, 64, 3)).astype(np.uint8)
+    mesh = trimesh.creation.icosphere(subdivisions=1)
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(noise))
+    mesh.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(mesh.vertices), 2)), material=material)
+    whole = trimesh.Scene(mesh).export(file_type="glb")
+    inside = whole.index(b"IDAT") + 2000
+    path = tmp_path / "damaged.glb"
+    path.write_bytes(whole[:inside] + bytes(4000) + whole[inside + 4000 :])
+    with pytest.raises(InputError, match=r"damaged\.glb: broken data stream"):
+        TexturedModel(path, IDENTITY)
