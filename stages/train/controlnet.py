@@ -24,7 +24,7 @@ from torch import Tensor
 
 from stages.core import diffusion
 from stages.core.artifact import MANIFEST, Provenance, peek, plain_options, sha256_file
-from stages.core.errors import InputError, NumericalError
+from stages.core.errors import InputError, NumericalError, one_line
 from stages.core.progress import Progress, silent
 from stages.sd.files import ModelFiles, find_base, find_models
 from stages.sd.models import (
@@ -112,11 +112,17 @@ def learnt_from(options: TrainControlnetOptions) -> dict[str, Any]:
 
 
 def accelerator_of(options: TrainControlnetOptions) -> Any:
-    """Accelerate's view of the devices that are there. Raises: InputError when the batch cannot be divided over them."""
+    """Accelerate's view of the devices that are there.
+
+    Raises: InputError when they do not know the precision, or the batch cannot be divided over them.
+    """
     from accelerate import Accelerator
 
     precision = options.precision or ("bf16" if torch.cuda.is_available() else "no")
-    accelerator = Accelerator(mixed_precision=precision)
+    try:
+        accelerator = Accelerator(mixed_precision=precision)
+    except ValueError as error:
+        raise InputError(f"--precision {precision}: not on this machine ({one_line(error)})") from error
     together = options.at_once * accelerator.num_processes
     if options.batch % together:
         raise InputError(

@@ -210,9 +210,14 @@ def test_mixed_precision_learns_the_same(base: Path, pictures: Path, tmp_path: P
     assert not np.array_equal(found, exact)
 
 
-def test_what_cannot_be_trained_is_one_line(base: Path, pictures: Path, tmp_path: Path) -> None:
+def test_what_cannot_be_trained_is_one_line(
+    base: Path, pictures: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ACCELERATE_USE_CPU", "1")
     with pytest.raises(InputError, match="--batch 4: not a multiple of 3"):
         train_controlnet(pictures, tmp_path, options(base, at_once=3))
+    with pytest.raises(InputError, match="--precision fp16: not on this machine"):
+        train_controlnet(pictures, tmp_path, options(base, precision="fp16"))
     with pytest.raises(InputError, match="--sd-model: not given"):
         train_controlnet(pictures, tmp_path, TrainControlnetOptions())
     with pytest.raises(ArtifactError, match="dreammat train pictures"):
