@@ -17,6 +17,7 @@ COMMANDS = {
     "bake": "Write textures and a model with the material.",
     "report": "Measure speed against error.",
     "train": "Train the diffusion models.",
+    "eval": "Measure assets: CLIP score and FID.",
 }
 
 INTERRUPTED = 130

@@ -36,7 +36,11 @@ def mesh(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize("command", ("", "prep", "conditions", "distill", "bake", "report conditions", "train prior"))
+STAGES = ("prep", "conditions", "distill", "bake")
+TRAINING = ("train prior", "train pictures", "train controlnet")
+
+
+@pytest.mark.parametrize("command", ("", *STAGES, "report conditions", "eval", *TRAINING))
 def test_help_shows_usage(command: str) -> None:
     result = dreammat(*command.split(), "--help")
     assert result.returncode == OK
@@ -78,6 +82,8 @@ def test_json_is_all_that_stdout_holds(mesh: Path, tmp_path: Path) -> None:
         ("conditions", "p.npz", "-o", "c", "--fov", "45", "25"),
         ("distill", "c", "-o", "m.npz", "--guidance", "magic"),
         ("bake", "p.npz", "m.npz", "-o", "a", "--size", "1000"),
+        ("train", "pictures", "m", "-o", "p", "--shard", "3/2"),
+        ("train", "pictures", "m", "-o", "p", "--shard", "half"),
         ("nonsense",),
     ],
 )

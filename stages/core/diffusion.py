@@ -50,11 +50,18 @@ def image_from_velocity(alpha_bar: Tensor, x_t: Tensor, v: Tensor, t: Tensor) ->
     return a.sqrt() * x_t - (1 - a).sqrt() * v
 
 
-def ddim(alpha_bar: Tensor, predict: Callable[[Tensor, Tensor], Tensor], noise: Tensor, steps: int) -> Tensor:
+def ddim(
+    alpha_bar: Tensor,
+    predict: Callable[[Tensor, Tensor], Tensor],
+    noise: Tensor,
+    steps: int,
+    limits: tuple[float, float] = (-1.2, 3.0),
+) -> Tensor:
     """Deterministic sampling. Source: Song et al. 2021, Eq. 12 with sigma = 0.
 
     Args:
-        predict: (x_t, t) -> eps. noise: (B, C, H, W). steps: how many of `STEPS` are visited.
+        predict: (x_t, t) -> eps. noise: (B, C, H, W). steps: how many of `STEPS` are visited. limits: of x_0; the
+        default is for toned pictures.
     """
     x = noise
     times = torch.linspace(STEPS - 1, 0, steps).round().long().tolist()
@@ -63,5 +70,5 @@ def ddim(alpha_bar: Tensor, predict: Callable[[Tensor, Tensor], Tensor], noise: 
         eps = predict(x, t)
         a, b = alpha_bar[now], alpha_bar[then] if then >= 0 else torch.ones_like(alpha_bar[0])
         x0 = (x - (1 - a).sqrt() * eps) / a.sqrt()
-        x = b.sqrt() * x0.clamp(-1.2, 3.0) + (1 - b).sqrt() * eps
+        x = b.sqrt() * x0.clamp(*limits) + (1 - b).sqrt() * eps
     return x

@@ -101,10 +101,11 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
     """The guidance that the options name. Raises: InputError, ArtifactError."""
     if options.guidance == "reference":
         from stages.distill.guidance import reference
+        from stages.light.textured_model import TexturedModel
 
         if options.reference is None:
             raise InputError("--guidance reference: no model is given; add --reference MODEL.glb")
-        asset = reference.ReferenceAsset(options.reference, views.to_world)
+        asset = TexturedModel(options.reference, views.to_world)
         chosen = step_generator(options.seed, POOL)
         pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device)
         return reference.ReferenceGuidance(asset, pool)

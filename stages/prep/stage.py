@@ -54,7 +54,7 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
         source = READERS[mesh.suffix.lower()](mesh)
         progress("mend", 1, 4)
         working = repair(source, options.up, options.weld_tolerance, mesh)
-        normals, findings = _orient(source, working, options.crease_angle)
+        normals, findings = oriented(source, working, options.crease_angle)
         progress("unwrap", 2, 4)
         loop_uv, kept, layout = _texture(source, working, options, mesh)
         uv = loop_uv[working.loops]
@@ -93,8 +93,8 @@ def _inputs(mesh: Path) -> dict[str, str]:
     return inputs
 
 
-def _orient(source: Source, working: Working, crease_angle: float) -> tuple[NDArray, dict[str, Any]]:
-    """Turn faces outward, in place; shading normals (F, 3, 3) and what was found."""
+def oriented(source: Source, working: Working, crease_angle: float) -> tuple[NDArray, dict[str, Any]]:
+    """Turn faces outward, in place. Returns: shading normals (F, 3, 3), and what was found."""
     winding = outward(working.vertices, working.triangles)
     turn = winding.flip[:, None]
     working.triangles = np.where(turn, working.triangles[:, [0, 2, 1]], working.triangles)

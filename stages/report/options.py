@@ -33,3 +33,27 @@ class PriorReportOptions:
     """of every distillation; None for the default"""
     views: int = 48
     """cameras of every mesh"""
+
+
+@dataclass(frozen=True)
+class EvalOptions:
+    """Options of `dreammat eval`. Models are local; the paper's Table 2 has 50 assets, 120 views and samples of each."""
+
+    sd_model: str = ""
+    """the base that draws the pictures to compare with: a folder in the layout of diffusers, or an id of the hub"""
+    clip: str = ""
+    """folder of a CLIP model as transformers writes it"""
+    inception: str = ""
+    """TorchScript file of the Inception network: uint8 pictures (N, 3, H, W), return_features=True -> (N, D)"""
+    views: int = 120
+    """random views of an asset"""
+    samples: int = 120
+    """pictures that the base draws for an asset's prompt"""
+    size: int = 512
+    """pixels along each side of a picture"""
+    env: tuple[str, ...] = ()
+    """as for `conditions`, taken in turn; empty for the five built-in environments"""
+    seed: int = 0
+    """of views, rays and samples"""
+    device: str = "cpu"
+    """a torch device"""

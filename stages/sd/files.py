@@ -87,11 +87,8 @@ def find_models(options: SdOptions) -> ModelFiles:
 
     Raises: InputError when packages or files are missing, or the models do not fit each other or the 22 channels.
     """
-    if missing := [name for name in PACKAGES if importlib.util.find_spec(name) is None]:
-        raise InputError(f'--guidance sd: needs {", ".join(missing)}, not installed here; pip install ".[sd]"')
-    base = _folder("--sd-model", options.sd_model, ("unet", "vae", "text_encoder"))
+    base, (unet, vae, text_encoder) = find_base(options.sd_model)
     controlnet = _network(_folder("--controlnet", options.controlnet, ("",)))
-    unet, vae, text_encoder = (_network(base / name) for name in ("unet", "vae", "text_encoder"))
     scheduler = read_json(base / "scheduler" / "scheduler_config.json")
     if not isinstance(scheduler, dict):
         raise InputError(f"{base}/scheduler/scheduler_config.json: missing or not JSON; expected the layout of diffusers")
@@ -101,6 +98,16 @@ def find_models(options: SdOptions) -> ModelFiles:
         if not fits:
             raise InputError(problem)
     return files
+
+
+def find_base(source: str) -> tuple[Path, tuple[Network, Network, Network]]:
+    """The base's folder, and in it unet, vae and text encoder. Raises: InputError when packages or files are missing."""
+    if missing := [name for name in PACKAGES if importlib.util.find_spec(name) is None]:
+        raise InputError(f'Stable Diffusion: needs {", ".join(missing)}, not installed here; pip install ".[sd]"')
+    parts = ("unet", "vae", "text_encoder")
+    base = _folder("--sd-model", source, parts)
+    unet, vae, text_encoder = (_network(base / name) for name in parts)
+    return base, (unet, vae, text_encoder)
 
 
 def _conditions(files: ModelFiles, times: int) -> list[tuple[bool, str]]:
@@ -150,7 +157,7 @@ def _conditions(files: ModelFiles, times: int) -> list[tuple[bool, str]]:
 def _folder(option: str, source: str, parts: tuple[str, ...]) -> Path:
     """The local folder of what a user gave: a path, or an id of the hub."""
     if not source:
-        raise InputError(f"{option}: not given; --guidance sd needs a folder in the layout of diffusers, or an id of the hub")
+        raise InputError(f"{option}: not given; expected a folder in the layout of diffusers, or an id of the hub")
     path = Path(source).expanduser()
     if path.is_dir():
         return path

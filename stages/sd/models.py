@@ -19,6 +19,10 @@ from stages.core import diffusion
 from stages.core.errors import InputError, one_line
 from stages.sd.files import ModelFiles, Network
 from stages.sd.memory import Plan
+from stages.sd.profile import CHANNELS
+
+EMBEDDING = (16, 32, 96, 256)
+"""Widths of a ControlNet's condition encoder, level by level: diffusers' default."""
 
 
 class Denoiser(nn.Module):
@@ -32,7 +36,7 @@ class Denoiser(nn.Module):
         self.unet, self.controlnet = unet, controlnet
 
     def forward(self, x_t: Tensor, t: Tensor, text: Tensor, conditions: Tensor | None, scale: Tensor) -> Tensor:
-        """What the model predicts; arguments as in `StableDiffusion.predict_noise`, scale (), all in the networks' dtype."""
+        """What the model predicts; arguments as in `StableDiffusion.predict_noise`, scale (), all in the UNet's dtype."""
         if conditions is None:
             return self.unet(x_t, t, text, return_dict=False)[0]
         down, middle = self.controlnet(x_t, t, text, conditions, return_dict=False)
@@ -40,8 +44,8 @@ class Denoiser(nn.Module):
             x_t,
             t,
             text,
-            down_block_additional_residuals=[scale * residual for residual in down],
-            mid_block_additional_residual=scale * middle,
+            down_block_additional_residuals=[(scale * residual).to(x_t.dtype) for residual in down],
+            mid_block_additional_residual=(scale * middle).to(x_t.dtype),
             return_dict=False,
         )[0]
 
@@ -66,20 +70,14 @@ class StableDiffusion:
         return {"name": "stable-diffusion", **sources, "weights": weights, "prediction": self.files.prediction}
 
     def embed(self, prompts: list[str]) -> Tensor:
-        """Text embeddings (N, T, D) of N prompts; "" is the null prompt. The text encoder is loaded for this call alone."""
-        from transformers import CLIPTextModel, CLIPTokenizer
+        """Text embeddings (N, T, D) of N prompts; "" is the null prompt. The text encoder is loaded for this call alone.
 
-        folder, longest = self.files.base / "tokenizer", self.files.text_encoder["max_position_embeddings"]
-        try:
-            tokenizer = CLIPTokenizer.from_pretrained(folder, local_files_only=True)
-        except Exception as error:  # whatever a malformed file makes it trip over
-            raise InputError(f"{folder}: not a readable tokenizer ({one_line(error)}); get it again") from error
-        tokens = [tokenizer(prompt, padding="max_length", max_length=longest).input_ids for prompt in prompts]
-        if long := [prompt for prompt, row in zip(prompts, tokens, strict=True) if len(row) > longest]:
-            raise InputError(f'--prompt "{long[0][:40]}…": longer than the {longest - 2} tokens that are read; shorten it')
-        encoder = _load(CLIPTextModel, self.files.text_encoder)
-        with torch.no_grad():
-            return encoder(torch.tensor(tokens)).last_hidden_state.to(self.device, self.denoiser.unet.dtype)
+        Raises: InputError when a prompt is too long to be read whole.
+        """
+        text = load_text_encoder(self.files)
+        if long := [prompt for prompt in prompts if len(text.tokenizer(prompt).input_ids) > text.longest]:
+            raise InputError(f'--prompt "{long[0][:40]}…": longer than the {text.longest - 2} tokens that are read; shorten it')
+        return text.embed(prompts).to(self.device, self.denoiser.unet.dtype)
 
     def encode(self, picture: Tensor) -> Tensor:
         """Latents of pictures: the mean of what the encoder holds likely.
@@ -91,6 +89,11 @@ class StableDiffusion:
         """
         posterior = self.vae.encode((2 * picture - 1).to(self.vae.dtype)).latent_dist
         return self.vae.config.scaling_factor * posterior.mode().float()
+
+    def decode(self, latents: Tensor) -> Tensor:
+        """Pictures (B, 3, H, W) in [0, 1] of latents; of models loaded for training, whose VAE is whole."""
+        decoded = self.vae.decode((latents / self.vae.config.scaling_factor).to(self.vae.dtype)).sample
+        return (decoded.float() / 2 + 0.5).clamp(0, 1)
 
     def predict_noise(self, x_t: Tensor, t: Tensor, text: Tensor, conditions: Tensor | None, scale: float) -> Tensor:
         """The noise in x_t.
@@ -116,13 +119,42 @@ class StableDiffusion:
         return predicted
 
 
+@dataclass(frozen=True)
+class TextEncoder:
+    """CLIP's tokenizer and text encoder. longest: tokens that are read, the first and the last one included."""
+
+    tokenizer: Any
+    encoder: Any
+    longest: int
+
+    def embed(self, prompts: list[str]) -> Tensor:
+        """Text embeddings (N, T, D) float32 of N prompts, each cut to `longest`."""
+        cut = {"padding": "max_length", "truncation": True, "max_length": self.longest}
+        tokens = torch.tensor([self.tokenizer(prompt, **cut).input_ids for prompt in prompts])
+        with torch.no_grad():
+            return self.encoder(tokens.to(self.encoder.device)).last_hidden_state
+
+
+def load_text_encoder(files: ModelFiles) -> TextEncoder:
+    """On the CPU. Raises: InputError when a file is damaged."""
+    from transformers import CLIPTextModel, CLIPTokenizer
+
+    folder = files.base / "tokenizer"
+    try:
+        tokenizer = CLIPTokenizer.from_pretrained(folder, local_files_only=True)
+    except Exception as error:  # whatever a malformed file makes it trip over
+        raise InputError(f"{folder}: not a readable tokenizer ({one_line(error)}); get it again") from error
+    encoder = load_network(CLIPTextModel, files.text_encoder)
+    return TextEncoder(tokenizer, encoder, files.text_encoder["max_position_embeddings"])
+
+
 def load_models(files: ModelFiles, device: torch.device, plan: Plan) -> StableDiffusion:
     """The models, ready for inference on a device. Raises: InputError when a file is damaged or of another network."""
-    from diffusers import AutoencoderKL, ControlNetModel, DDPMScheduler, UNet2DConditionModel
+    from diffusers import AutoencoderKL, ControlNetModel, UNet2DConditionModel
 
-    _be_quiet()
-    unet, controlnet = _load(UNet2DConditionModel, files.unet), _load(ControlNetModel, files.controlnet)
-    vae = _load(AutoencoderKL, files.vae)
+    be_quiet()
+    unet, controlnet = load_network(UNet2DConditionModel, files.unet), load_network(ControlNetModel, files.controlnet)
+    vae = load_network(AutoencoderKL, files.vae)
     del vae.decoder
     if device.type == "cuda":
         unet, controlnet = unet.half(), controlnet.half()
@@ -138,12 +170,51 @@ def load_models(files: ModelFiles, device: torch.device, plan: Plan) -> StableDi
     else:
         denoiser.to(device)
         _compile(denoiser, device)
+    return StableDiffusion(files, denoiser, vae.to(device), _alpha_bar(files, device), files.hashes(), device, plan)
+
+
+def load_for_training(files: ModelFiles, device: torch.device, dtype: torch.dtype) -> StableDiffusion:
+    """The models with a ControlNet that learns, in float32; the rest is frozen, in a dtype, the VAE never in half precision.
+
+    Raises: InputError when a file is damaged or of another network.
+    """
+    from diffusers import AutoencoderKL, ControlNetModel, UNet2DConditionModel
+
+    be_quiet()
+    unet, vae = load_network(UNet2DConditionModel, files.unet), load_network(AutoencoderKL, files.vae)
+    controlnet = load_network(ControlNetModel, files.controlnet).train().requires_grad_()
+    denoiser = Denoiser(unet.to(dtype), controlnet).to(device)
+    vae.to(device, torch.float32 if dtype == torch.float16 else dtype)
+    return StableDiffusion(files, denoiser, vae, _alpha_bar(files, device), files.hashes(), device, Plan())
+
+
+def write_untrained_controlnet(folder: Path, unet: Network, vae: Network, seed: int) -> None:
+    """Write a ControlNet for 22 channels that begins as a copy of the UNet's encoder and as yet changes nothing.
+
+    Source: Zhang et al. 2023, "Adding Conditional Control to Text-to-Image Diffusion Models", Section 3.
+    """
+    from diffusers import ControlNetModel, UNet2DConditionModel
+
+    be_quiet()
+    levels = len(vae["block_out_channels"])  # conditions shrink as pictures do
+    with torch.random.fork_rng():  # nn.Module initialisation knows only the global generator, which is put back
+        torch.default_generator.manual_seed(seed)
+        controlnet = ControlNetModel.from_unet(
+            load_network(UNet2DConditionModel, unet),
+            conditioning_channels=CHANNELS,
+            conditioning_embedding_out_channels=EMBEDDING[:levels],
+        )
+    controlnet.save_pretrained(folder)
+
+
+def _alpha_bar(files: ModelFiles, device: torch.device) -> Tensor:
+    from diffusers import DDPMScheduler
+
     scheduler = DDPMScheduler.from_pretrained(files.base / "scheduler", local_files_only=True)
-    alpha_bar = scheduler.alphas_cumprod.to(device)
-    return StableDiffusion(files, denoiser, vae.to(device), alpha_bar, files.hashes(), device, plan)
+    return scheduler.alphas_cumprod.to(device)
 
 
-def _load(kind: Any, network: Network) -> Any:
+def load_network(kind: Any, network: Network) -> Any:
     """A network with the weights of its file, all of them, in float32 on the CPU."""
     name = network.weights.name
     try:
@@ -184,7 +255,7 @@ def _compile(denoiser: Denoiser, device: torch.device) -> None:
                 module.compile()
 
 
-def _be_quiet() -> None:
+def be_quiet() -> None:
     """Keep the libraries' remarks and progress bars off the terminal; errors come as exceptions."""
     import diffusers.utils.logging
     import transformers.utils.logging

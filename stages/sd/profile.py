@@ -36,6 +36,12 @@ def prepare(depth: Tensor, normal: Tensor, mask: Tensor, lights: Tensor) -> Tens
     return torch.cat([inverse_depth(depth, inside), *direction, toned], 1)
 
 
+def background() -> Tensor:
+    """The condition channels off the object, (22, 1, 1)."""
+    nothing = torch.zeros(1, 1, 1, 1)
+    return prepare(nothing, nothing.expand(1, 3, 1, 1), nothing, nothing.expand(1, 18, 1, 1))[0]
+
+
 def without(conditions: Tensor, geometry: bool, light: bool) -> Tensor:
     """The same conditions with geometry, light, or both set to 0: the paper's ablations."""
     kept = conditions.clone()

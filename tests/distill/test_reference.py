@@ -11,9 +11,10 @@ from PIL import Image
 from stages.core.color import srgb_decode
 from stages.core.errors import InputError
 from stages.core.shading import Material, shade
-from stages.distill.guidance.reference import ReferenceAsset, ReferenceGuidance, bilinear
+from stages.distill.guidance.reference import ReferenceGuidance
 from stages.distill.sampling import PixelSampler, Sample
 from stages.distill.views import Views
+from stages.light.textured_model import TexturedModel
 from tests.distill.examples import RADIUS, painted_sphere, write_conditions
 
 CPU = torch.device("cpu")
@@ -29,18 +30,8 @@ def pool(conditions: Path) -> PixelSampler:
     return PixelSampler(Views(conditions), 64, torch.Generator().manual_seed(0), CPU)
 
 
-def test_bilinear_decodes_before_it_blends_and_repeats() -> None:
-    texture = np.array([[[0], [255]], [[100], [200]]], np.uint8)
-    decode = srgb_decode(np.arange(256) / 255).astype(np.float32)
-    centres = np.array([[0.25, 0.75], [0.75, 0.75], [0.25, 0.25], [1.25, -0.25]])  # v is up, the first row on top
-    expected = decode[[0, 255, 100, 0]]
-    np.testing.assert_allclose(bilinear(texture, centres, decode)[:, 0], expected, atol=1e-6)
-    middle = bilinear(texture, np.array([[0.5, 0.75], [0.0, 0.75]]), decode)[:, 0]
-    np.testing.assert_allclose(middle, [0.5, 0.5], atol=1e-6)  # the mean of linear 0 and 1, also across the edge
-
-
 def test_material_is_that_of_the_point_seen(conditions: Path, tmp_path: Path) -> None:
-    asset = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY)
+    asset = TexturedModel(painted_sphere(tmp_path / "sphere.glb"), IDENTITY)
     seen = pool(conditions)
     material, found = asset.material_at(seen.points.numpy(), seen.eyes.numpy())
     height = seen.points[:, 2].numpy() + RADIUS
@@ -50,18 +41,6 @@ def test_material_is_that_of_the_point_seen(conditions: Path, tmp_path: Path) ->
     np.testing.assert_allclose(material[:, 3], (200 - 120 * height) / 255, atol=0.01)
     clear = abs(height - 0.5) > 0.03
     np.testing.assert_allclose(material[clear, 4], (height > 0.5)[clear], atol=1e-6)
-
-
-def test_factors_multiply_and_stand_in_for_textures(tmp_path: Path) -> None:
-    mesh = trimesh.creation.icosphere(subdivisions=2, radius=RADIUS)
-    plain = trimesh.visual.material.PBRMaterial(baseColorFactor=[255, 128, 0, 255], metallicFactor=0.25, roughnessFactor=0.5)
-    mesh.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(mesh.vertices), 2)), material=plain)
-    path = tmp_path / "plain.glb"
-    path.write_bytes(trimesh.Scene(mesh).export(file_type="glb"))
-    points = mesh.triangles_center[:5]
-    material, found = ReferenceAsset(path, IDENTITY).material_at(points, 3 * points)
-    assert found.all()
-    np.testing.assert_allclose(material, np.tile([1, 128 / 255, 0, 0.5, 0.25], (5, 1)), atol=1e-6)
 
 
 def test_to_world_is_applied(conditions: Path, tmp_path: Path) -> None:
@@ -77,15 +56,15 @@ def test_to_world_is_applied(conditions: Path, tmp_path: Path) -> None:
     to_world = np.diag([0.1, 0.1, 0.1, 1.0])
     to_world[:3, 3] = -0.1 * shift
     seen = pool(conditions)
-    found = ReferenceAsset(path, to_world).material_at(seen.points.numpy(), seen.eyes.numpy())[1]
+    found = TexturedModel(path, to_world).material_at(seen.points.numpy(), seen.eyes.numpy())[1]
     assert found.all()
     with pytest.raises(InputError, match="expected the shape"):
-        ReferenceGuidance(ReferenceAsset(path, IDENTITY), seen)
+        ReferenceGuidance(TexturedModel(path, IDENTITY), seen)
 
 
 def at_the_truth(conditions: Path, folder: Path, generator: torch.Generator) -> tuple[ReferenceGuidance, Sample, torch.Tensor]:
     """A guidance, a sample of it, and what that shows with the true material."""
-    asset, seen = ReferenceAsset(painted_sphere(folder / "sphere.glb"), IDENTITY), pool(conditions)
+    asset, seen = TexturedModel(painted_sphere(folder / "sphere.glb"), IDENTITY), pool(conditions)
     sample = seen.draw(generator)
     assert sample.rows is not None
     truth = torch.from_numpy(asset.material_at(seen.points.numpy(), seen.eyes.numpy())[0])[sample.rows]
@@ -114,28 +93,13 @@ def test_curvature_is_the_gradients_slope_for_small_residuals(conditions: Path, 
 
 
 def test_far_residuals_weigh_less_but_still_pull(conditions: Path, tmp_path: Path) -> None:
-    asset, seen = ReferenceAsset(painted_sphere(tmp_path / "sphere.glb"), IDENTITY), pool(conditions)
+    asset, seen = TexturedModel(painted_sphere(tmp_path / "sphere.glb"), IDENTITY), pool(conditions)
     guidance = ReferenceGuidance(asset, seen)
     sample = seen.draw(torch.Generator().manual_seed(1))
     radiance = 10 * shade(sample.transport, Material(torch.ones(64, 3), torch.full((64,), 0.5), torch.zeros(64)))
     near, far = (guidance.respond(k * radiance, sample, 0.0, torch.Generator()) for k in (1, 10))
     assert near.curvature is not None and far.curvature is not None
     assert bool((far.curvature * 100 < near.curvature).all()) and bool((far.gradient > 0).all())
-
-
-def test_bad_models_are_one_line_errors(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"nothing\.glb: no such file"):
-        ReferenceAsset(tmp_path / "nothing.glb", IDENTITY)
-    with pytest.raises(InputError, match=r"mesh\.obj: expected a \.glb"):
-        ReferenceAsset(tmp_path / "mesh.obj", IDENTITY)
-    garbage = tmp_path / "garbage.glb"
-    garbage.write_bytes(b"glTF but not really")
-    with pytest.raises(InputError, match=r"garbage\.glb: not a readable glTF model"):
-        ReferenceAsset(garbage, IDENTITY)
-    bare = tmp_path / "bare.glb"
-    bare.write_bytes(trimesh.Scene(trimesh.creation.icosphere(subdivisions=1)).export(file_type="glb"))
-    with pytest.raises(InputError, match="no metallic-roughness material"):
-        ReferenceAsset(bare, IDENTITY)
 
 
 def test_some_points_of_a_sample_are_those_of_the_pool(conditions: Path) -> None:

@@ -19,6 +19,7 @@ from stages.distill.guidance.base import Response
 from stages.distill.options import DistillOptions
 from stages.distill.stage import distill
 from stages.distill.views import Views
+from stages.light.textured_model import TexturedModel
 from tests.conftest import Golden
 from tests.distill.examples import painted_sphere, write_conditions
 
@@ -76,7 +77,7 @@ def test_finds_the_known_material(folder: Path, tmp_path: Path) -> None:
     seen = [views.surface(view, np.arange(len(views.pixels(view)))).points for view in views.seen]
     points = torch.cat(seen)
     eyes = np.repeat(views.c2w[views.seen, :3, 3], [len(s) for s in seen], 0)
-    truth, _ = reference.ReferenceAsset(folder / "sphere.glb", np.eye(4)).material_at(points.numpy(), eyes)
+    truth, _ = TexturedModel(folder / "sphere.glb", np.eye(4)).material_at(points.numpy(), eyes)
     away = abs(points[:, 2].numpy()) > 0.06  # the step between dielectric and metal is finer than the views
     found = field(points)
     roughness = found.roughness.detach().numpy()[:, None]

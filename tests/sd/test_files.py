@@ -122,7 +122,7 @@ def test_what_does_not_fit_is_one_line(folder: Path, spoil: Callable[[Path], Non
         ("SD", "", "--controlnet: not given"),
         ("/nowhere/at/all", "CONTROL", "--sd-model /nowhere/at/all: no such folder"),
         ("./nowhere", "CONTROL", "--sd-model ./nowhere: no such folder"),
-        ("CONTROL", "SD", "sd/config.json: missing"),
+        ("SD", "SD", "sd/config.json: missing"),
         ("CONTROL", "CONTROL", "controlnet/unet/config.json: missing"),
     ],
 )
