@@ -60,7 +60,7 @@ def test_regions_are_told_by_height() -> None:
 
 
 def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, less in (("TEXTURE", 512), ("PREVIEW", 64), ("POINTS", 300)):
+    for name, less in (("PREVIEW", 64), ("POINTS", 300), ("GIVEN", ("geometry", "full"))):
         monkeypatch.setattr(prior, name, less)
     ball = tmp_path / "ball.obj"
     trimesh.creation.icosphere(subdivisions=2).export(ball)
@@ -69,7 +69,7 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with (tmp_path / "prior.csv").open() as stream:
         rows = list(csv.DictReader(stream))
     assert {(row["given"], row["lights"]) for row in rows} == {
-        ("full", "all"), ("none", "all"), ("geometry", "all"), ("light", "all"), ("full", "one"),
+        ("full", "all"), ("geometry", "all"), ("full", "one"),
     }  # fmt: skip
     assert all(0 <= float(row["decided"]) <= 1 and float(row["relight_percent"]) >= 0 for row in rows if not row["regions"])
     assert {line.measure for line in lines} >= {"roughness error", "identified, %", "baked light, |correlation|"}
