@@ -32,6 +32,8 @@ DEFAULT = defaults(ConditionsOptions)
               metavar="LOW HIGH", help="Camera elevation, degrees.")
 @click.option("--frame", type=(click.FloatRange(0.05, 1),) * 2, default=DEFAULT["frame"], show_default=True,
               metavar="LOW HIGH", help="Share of the half-frame that the object reaches.")
+@click.option("--profile", type=click.Choice(["gltf", "sd"]), default=DEFAULT["profile"], show_default=True,
+              help="sd: also smooth normals and Blender's light maps with a bounce, as the released ControlNet knows them.")
 @click.option("--maps", is_flag=True, help="Also write maps_<environment>.exr for every view.")
 @common_options
 def command(prep: Path, output: Path, common: Common, **chosen: Any) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, reporter, show
-from stages.report.options import PriorReportOptions, ReportOptions
+from stages.report.options import DistillReportOptions, PriorReportOptions, ReportOptions
 
-DEFAULT, PRIOR = defaults(ReportOptions), defaults(PriorReportOptions)
+DEFAULT, PRIOR, DISTILL = defaults(ReportOptions), defaults(PriorReportOptions), defaults(DistillReportOptions)
 
 
 @click.group()
@@ -66,3 +66,28 @@ def prior(mesh: tuple[str, ...], output: Path, common: Common, **chosen: Any) ->
         lines = report_prior(output, options, progress)
     table = [f"{s.measure:30} {s.group:18} {s.value:8.3f} [{s.low:.3f}, {s.high:.3f}]  {s.target} {s.met}" for s in lines]
     show(common, {"summary": [dataclasses.asdict(line) for line in lines]}, table)
+
+
+@command.command()
+@click.argument("conditions", type=INPUT, metavar="CONDITIONS")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV.")
+@click.option("--sd-model", default=DISTILL["sd_model"], metavar="PATH|ID", help="As for `distill`.  [default: random weights]")
+@click.option("--controlnet", default=DISTILL["controlnet"], metavar="PATH|ID", help="As for `distill`.")
+@click.option("--vram", type=click.IntRange(8), default=DISTILL["vram"], metavar="GIB", help="As for `distill`.")
+@click.option("--batch", type=click.IntRange(1), default=DISTILL["batch"], show_default=True, help="Views a step.")
+@click.option("--warm-up", type=click.IntRange(0), default=DISTILL["warm_up"], show_default=True, metavar="N",
+              help="Steps before those that are measured.")
+@click.option("--steps", type=click.IntRange(1), default=DISTILL["steps"], show_default=True, metavar="N",
+              help="Steps that are measured part by part, and as many again as a whole.")
+@click.option("--device", default=DISTILL["device"], show_default=True, help="A torch device: cpu, cuda.")
+@common_options
+def distill(conditions: Path, output: Path, common: Common, **chosen: Any) -> None:
+    """What a step with Stable Diffusion costs on views of CONDITIONS, part by part: FLOPs, bytes, time, share of the peak."""
+    options = DistillReportOptions(**chosen)
+    if plan(common, "measure into", output, options):
+        return
+    from stages.report.distill import report_distill, summary
+
+    with reporter(common) as progress:
+        report = report_distill(conditions, output, options, progress)
+    show(common, dataclasses.asdict(report), summary(report))

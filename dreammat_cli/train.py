@@ -45,13 +45,15 @@ def command() -> None:
 
 @command.command()
 @click.option("-o", "--out", type=INPUT, required=True, metavar="FOLDER", help="Data, checkpoint, curve, samples, weights.")
-@number(PRIOR, "steps", "Optimiser steps, those of the text encoder included.")
-@number(PRIOR, "text_steps", "First steps, in which the text encoder learns alone.", 0)
+@number(PRIOR, "steps", "Optimiser steps, those of the reader included.")
+@number(PRIOR, "text_steps", "First steps, in which the reader of prompts learns alone.", 0)
 @number(PRIOR, "batch", "Pictures a step.")
 @click.option("--learning-rate", type=RATE, default=PRIOR["learning_rate"], show_default=True,
               help="Of Adam, after warming up.")
 @number(PRIOR, "shards", "Files of light transport to train on.")
 @number(PRIOR, "tiles", "Pictures in each file.")
+@click.option("--from", "start", type=INPUT, default=PRIOR["start"], metavar="WEIGHTS.npz",
+              help="Weights to begin with, as far as they fit; random ones without it.")
 @number(PRIOR, "seed", "Of shapes, lights, materials and noise.", 0)
 @click.option("--device", default=PRIOR["device"], show_default=True, help="A torch device: cpu, cuda, mps.")
 @number(PRIOR, "workers", "Processes that make batches; 0: the training process itself.", 0)

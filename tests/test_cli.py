@@ -40,7 +40,7 @@ STAGES = ("prep", "conditions", "distill", "bake")
 TRAINING = ("train prior", "train pictures", "train controlnet")
 
 
-@pytest.mark.parametrize("command", ("", *STAGES, "report conditions", "eval", *TRAINING))
+@pytest.mark.parametrize("command", ("", *STAGES, "report conditions", "report distill", "report prior", "eval", *TRAINING))
 def test_help_shows_usage(command: str) -> None:
     result = dreammat(*command.split(), "--help")
     assert result.returncode == OK

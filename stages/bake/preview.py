@@ -13,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from stages.bake.jit import in_parallel
 from stages.bake.raster import Surface
 from stages.core.color import srgb_encode
 from stages.core.frames import camera_rays, look_at
@@ -22,7 +23,7 @@ from stages.light.environment import Environment
 from stages.light.gbuffer import trace_view
 from stages.light.lights import preview_light
 from stages.light.scene import Scene
-from stages.light.transport import Quality, light_transport
+from stages.light.transport import Quality, cached_light_set, light_transport
 
 FOV_Y = np.radians(30.0)
 """Vertical field of view: a mild telephoto, as product pictures have it."""
@@ -76,15 +77,13 @@ def contact_sheet(
         (rows, columns, 3) encoded sRGB in [0, 1].
     """
     light, used = preview_light(), scene.vertices[np.unique(scene.triangles)].astype(np.float64)
-    cells: list[NDArray[np.float32]] = []
-    strip: list[NDArray[np.float32]] = []
-    for k, (azimuth, elevation) in enumerate(VIEWS):
-        progress("preview", k, len(VIEWS))
-        shaded, material = draw_view(scene, light, uv, maps, camera(used, azimuth, elevation), size)
-        cells.append(srgb_encode(shaded.over(_backdrop(size))))
-        strip = strip or [*material_cells(material, size), labelled(atlas(maps, size), "albedo.png")]
-    progress("preview", len(VIEWS), len(VIEWS))
-    cells += strip
+    progress("preview", 0, 1)
+    cached_light_set((light,))  # once, not in every thread
+    views = [camera(used, azimuth, elevation) for azimuth, elevation in VIEWS]
+    drawn = in_parallel(lambda c2w: draw_view(scene, light, uv, maps, c2w, size), views)
+    cells = [srgb_encode(shaded.over(_backdrop(size))) for shaded, _ in drawn]
+    cells += [*material_cells(drawn[0][1], size), labelled(atlas(maps, size), "albedo.png")]
+    progress("preview", 1, 1)
     return np.concatenate([np.concatenate(cells[k : k + COLUMNS], 1) for k in range(0, len(cells), COLUMNS)], 0)
 
 
@@ -112,7 +111,7 @@ def draw_view(
     if coarse.mask.any():
         transport = light_transport(scene, coarse, [light], RAYS, seed=0)[0]
         values = torch.from_numpy(sampled)
-        material = Material(values[:, :3], values[:, 3], values[:, 4])
+        material = Material.of(values)
         nearest = torch.from_numpy(_nearest_hit(coarse.mask)[mask])
         color[mask] = EXPOSURE * shade(transport[nearest], material).numpy()
     return Picture(mask, color), (mask, sampled)

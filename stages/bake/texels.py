@@ -14,7 +14,7 @@ from stages.core.field import OUTPUTS, MaterialField
 from stages.core.progress import Progress
 
 TASKS = 8
-"""Bands that are rasterised side by side before their samples are evaluated: bounds the memory."""
+"""Bands between two reports of progress."""
 
 
 def bake_texels(
@@ -36,14 +36,16 @@ def bake_texels(
     size = layout.size
     maps, counts = np.zeros((size, size, OUTPUTS), np.float32), np.zeros((size, size), np.int32)
     todo = bands(size)
+
+    def bake_band(rows: range) -> None:
+        surface = covered_samples(layout, supersample, rows)
+        on_chart = surface.triangle >= 0
+        values = evaluate(field, surface.where(on_chart).interpolate(corners))
+        _average(on_chart, values, supersample, maps[rows.start : rows.stop], counts[rows.start : rows.stop])
+
     for first in range(0, len(todo), TASKS):
         progress("texels", first, len(todo))
-        group = todo[first : first + TASKS]
-        surfaces = in_parallel(lambda rows: covered_samples(layout, supersample, rows), group)
-        for rows, surface in zip(group, surfaces, strict=True):
-            on_chart = surface.triangle >= 0
-            values = evaluate(field, surface.where(on_chart).interpolate(corners))
-            _average(on_chart, values, supersample, maps[rows.start : rows.stop], counts[rows.start : rows.stop])
+        in_parallel(bake_band, todo[first : first + TASKS])
     bare = (counts == 0) & (touched.triangle >= 0)
     maps[bare] = evaluate(field, touched.where(bare).interpolate(corners))
     progress("texels", len(todo), len(todo))

@@ -9,7 +9,7 @@ from stages.core.artifact import write_exr
 from stages.core.color import srgb_encode
 from stages.core.images import write_png
 from stages.core.shading import LIGHT_MAPS, Transport, light_maps
-from stages.core.views import Geometry, view_folder
+from stages.core.views import Geometry, light_map_names, view_folder
 
 SHEET_TILE = 160
 """Pixels along each side of a tile on the contact sheet, at most."""
@@ -19,11 +19,6 @@ SHEET_WHITE = 0.7
 
 SHEET_VIEWS = 2
 """Views on the contact sheet."""
-
-
-def map_names() -> list[str]:
-    """Names of the six light maps, as channels carry them: light_m0_r0, light_m0_r0.5, ..."""
-    return [f"light_m{m}_r{r:g}" for m, r in LIGHT_MAPS]
 
 
 def light_images(geometry: Geometry, transport: Transport) -> NDArray[np.float32]:
@@ -37,7 +32,7 @@ def write_maps(folder: Path, view: int, environment: str, geometry: Geometry, tr
     """Write view_NNN/maps_<environment>.exr, float32 over the whole view."""
     channels = {"depth": geometry.depth}
     channels |= {f"normal.{c}": geometry.normal[..., i] for i, c in enumerate("RGB")}
-    for name, image in zip(map_names(), light_images(geometry, transport), strict=True):
+    for name, image in zip(light_map_names(), light_images(geometry, transport), strict=True):
         channels |= {f"{name}.{c}": image[..., i] for i, c in enumerate("RGB")}
     write_exr(folder / view_folder(view) / f"maps_{environment}.exr", channels)
 

@@ -25,5 +25,7 @@ class ConditionsOptions:
     """camera elevation, degrees"""
     frame: tuple[float, float] = (0.6, 0.85)
     """share of the half-frame that the object's farthest point reaches"""
+    profile: str = "gltf"
+    """for whom: "gltf" for the embedded prior and for references; "sd" adds what the released ControlNet was trained on"""
     maps: bool = False
     """also write the condition maps of every view as maps_<environment>.exr"""

@@ -1,13 +1,13 @@
 """The conditions stage: cameras, environments, and the light transport of every view under each of them."""
 
-import dataclasses
 import shutil
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from torch import Tensor
 
 from stages.conditions.cameras import Cameras, place_cameras
 from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
@@ -32,13 +32,16 @@ from stages.core.progress import Progress, silent
 from stages.core.schemas import CAMERAS, CONDITIONS, PREP
 from stages.core.shading import KNOTS, Transport
 from stages.core.views import (
+    SD,
     Geometry,
     read_geometry,
     read_transport,
     view_folder,
     write_geometry,
+    write_light_maps,
     write_transport,
 )
+from stages.light.bounce import blender_light_maps
 from stages.light.environment import Environment, load_environment, save_environment
 from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.lights import BUILTIN
@@ -74,7 +77,7 @@ def conditions(
     mesh = load_npz(prep, PREP)
     lights, clamped, hashes = read_lights(options.env)
     names = tuple(light.name for light in lights)
-    chosen = plain_options(dataclasses.replace(options, env=names))
+    chosen = plain_options(replace(options, env=names))
     request = Provenance(chosen, options.seed, {"prep": sha256_file(prep), **hashes})
     if not force and (done := peek(out, CONDITIONS)) and done.same_request(request):
         return ConditionsResult(names, 0, options.views, clamped, True)
@@ -86,18 +89,19 @@ def conditions(
         for light in lights:
             save_environment(out / "environments" / f"{light.name}.exr", light)
         scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        smooth = scene.shaded_smooth() if options.profile == SD else None
         quality, expected = QUALITY[options.quality], None
         if options.error:
             progress("choosing rays", 0, 1)
             first = trace_view(scene, cameras.c2w[0], float(cameras.fov_y[0]), options.size, options.size)
             quality, expected = choose_quality(scene, first, lights, options.error, options.seed)
-        missing = [view for view in range(options.views) if not view_is_there(out, view, names, options.maps)]
+        missing = [view for view in range(options.views) if not view_is_there(out, view, names, options)]
         made = len(missing)
         with ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
             written = None
             for i, view in enumerate(missing):
                 progress("views", options.views - made + i, options.views)
-                traced = trace(view, scene, cameras, lights, quality, options)
+                traced = trace(view, scene, smooth, cameras, lights, quality, options)
                 if written:
                     written.result()
                 written = writer.submit(write, out, view, lights, traced, options)
@@ -110,6 +114,7 @@ def conditions(
         "environments": names,
         "views": options.views,
         "knots": KNOTS,
+        "profile": options.profile,
         "clamped": clamped,
         "to_world": mesh["to_world"].ravel().tolist(),
     }
@@ -164,56 +169,70 @@ def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: Cond
     save_npz(out / "cameras.npz", CAMERAS, arrays, request)
 
 
-def view_is_there(out: Path, view: int, names: tuple[str, ...], maps: bool) -> bool:
+def view_is_there(out: Path, view: int, names: tuple[str, ...], options: ConditionsOptions) -> bool:
     """Whether every file of a view has been written; each is renamed into place when whole."""
-    return all((out / name).is_file() for name in view_files(view, names, maps))
+    return all((out / name).is_file() for name in view_files(view, names, options))
 
 
-def view_files(view: int, names: tuple[str, ...], maps: bool) -> list[str]:
+def view_files(view: int, names: tuple[str, ...], options: ConditionsOptions) -> list[str]:
     """Relative paths of a view's files."""
-    folder = view_folder(view)
-    kinds = ["geometry", *names, *(f"maps_{name}" for name in names if maps)]
-    return [f"{folder}/{kind}.exr" for kind in kinds]
+    kinds = ["geometry", *names, *(f"maps_{name}" for name in names if options.maps)]
+    if options.profile == SD:
+        kinds += [f"{SD}/{kind}" for kind in ("geometry", *names)]
+    return [f"{view_folder(view)}/{kind}.exr" for kind in kinds]
 
 
 def expected_files(names: tuple[str, ...], options: ConditionsOptions) -> list[str]:
     """Relative paths of everything a complete folder holds."""
-    views = [file for view in range(options.views) for file in view_files(view, names, options.maps)]
+    views = [file for view in range(options.views) for file in view_files(view, names, options)]
     return ["cameras.npz", "sheet.png", *(f"environments/{name}.exr" for name in names), *views]
+
+
+@dataclass(frozen=True)
+class View:
+    """What is written of a view. transports: one a light. smooth, maps: of the profile sd, or None: geometry, light maps."""
+
+    geometry: Geometry
+    transports: list[Transport]
+    smooth: Geometry | None = None
+    maps: list[Tensor] | None = None
 
 
 def trace(
     view: int,
     scene: Scene,
+    smooth: Scene | None,
     cameras: Cameras,
     lights: list[Environment],
     quality: Quality,
     options: ConditionsOptions,
-) -> tuple[Geometry, list[Transport]]:
-    """One view: its geometry, and its transport under every environment. Raises: NumericalError."""
-    c2w = cameras.c2w[view]
-    points = trace_view(scene, c2w, float(cameras.fov_y[view]), options.size, options.size)
-    seed = options.seed * 1_000_003 + view
+) -> View:
+    """One view under every environment. Args: smooth: the scene of the profile sd. Raises: NumericalError."""
+    camera = cameras.c2w[view], float(cameras.fov_y[view]), options.size, options.size
+    points, seed = trace_view(scene, *camera), options.seed * 1_000_003 + view
     transports = light_transport(scene, points, lights, quality, seed)
     for light, transport in zip(lights, transports, strict=True):
         check_finite(transport, light.name, view, options.seed)
-    return Geometry(points.mask, points.depth, view_normals(points, c2w)), transports
+    geometry = Geometry(points.mask, points.depth, view_normals(points, camera[0]))
+    if smooth is None:
+        return View(geometry, transports)
+    points = trace_view(smooth, *camera)
+    maps = blender_light_maps(smooth, points, lights, quality, seed)
+    return View(geometry, transports, replace(geometry, normal=view_normals(points, camera[0])), maps)
 
 
-def write(
-    out: Path,
-    view: int,
-    lights: list[Environment],
-    traced: tuple[Geometry, list[Transport]],
-    options: ConditionsOptions,
-) -> None:
+def write(out: Path, view: int, lights: list[Environment], traced: View, options: ConditionsOptions) -> None:
     """The files of one view."""
-    geometry, transports = traced
-    write_geometry(out, view, geometry)
-    for light, transport in zip(lights, transports, strict=True):
-        write_transport(out, view, light.name, geometry.mask, transport)
+    mask = traced.geometry.mask
+    write_geometry(out, view, traced.geometry)
+    for light, transport in zip(lights, traced.transports, strict=True):
+        write_transport(out, view, light.name, mask, transport)
         if options.maps:
-            write_maps(out, view, light.name, geometry, transport)
+            write_maps(out, view, light.name, traced.geometry, transport)
+    if traced.smooth is not None and traced.maps is not None:
+        write_geometry(out, view, traced.smooth, SD)
+        for light, maps in zip(lights, traced.maps, strict=True):
+            write_light_maps(out, view, light.name, mask, maps, SD)
 
 
 def view_normals(points: GBuffer, c2w: NDArray) -> NDArray[np.float32]:

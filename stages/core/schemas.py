@@ -48,10 +48,10 @@ CONDITIONS = Schema(
     "dreammat.conditions",
     1,
     # environments: names; views: count; knots: roughness of each A and B; clamped: name -> mended texels;
-    # to_world: 16 numbers, the mesh source's frame to world, row by row
+    # to_world: 16 numbers, the mesh source's frame to world, row by row; profile: "gltf", or "sd", which has files of its own
     extra=("environments", "views", "knots", "clamped", "to_world"),
 )
-"""A folder: cameras.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr."""
+"""A folder: cameras.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr; see `core.views`."""
 
 MATERIAL = Schema(
     "dreammat.material",

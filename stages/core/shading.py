@@ -81,6 +81,15 @@ class Material:
     roughness: Tensor
     metallic: Tensor
 
+    @staticmethod
+    def of(columns: Tensor) -> "Material":
+        """The material of columns (P, 5): albedo, roughness, metallic."""
+        return Material(columns[:, :3], columns[:, 3], columns[:, 4])
+
+    def columns(self) -> Tensor:
+        """Albedo, roughness and metallic as (P, 5). Differentiable in: all three."""
+        return torch.cat([self.albedo, self.roughness[:, None], self.metallic[:, None]], 1)
+
 
 def shade(transport: Transport, material: Material) -> Tensor:
     """Outgoing radiance of P points, each under L lights.
@@ -186,7 +195,8 @@ def interpolate(
     place = every[near]
     stacked = torch.cat([transport.A[row, place], transport.B[row, place]], -1).to(roughness.dtype)  # (P, 4, 6)
     scale = _knot_albedo(transport.cosine.to(roughness.dtype)).repeat_interleave(3, -1)  # (P, K, 6)
-    roughest = torch.cat([transport.A[:, every[-1]], transport.B[:, every[-1]]], -1).to(roughness.dtype) / scale[:, every[-1]]
+    end = kept[-1]
+    roughest = torch.cat([transport.A[:, end], transport.B[:, end]], -1).to(roughness.dtype) / scale[:, end]
     dark = DARK * roughest.clamp(min=0) + TINY  # (P, 6)
     y = torch.log((stacked / scale[row, place]).clamp(min=0) + dark[:, None])
     step = (r[:, 1:] - r[:, :-1])[..., None]  # (P, 3, 1); 0 beyond the ends

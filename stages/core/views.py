@@ -3,6 +3,9 @@
     view_007/geometry.exr       depth (planar, 0 off the object), normal.R|G|B (view space), mask; float32
     view_007/<environment>.exr  E.R|G|B, A<k>.R|G|B, B<k>.R|G|B for knot k of `core.shading.KNOTS`,
                                 and N·V as `cosine`; half float
+    view_007/sd/geometry.exr, sd/<environment>.exr
+                                of the profile sd: geometry with normals that are smooth everywhere, and the light maps of
+                                `core.shading.LIGHT_MAPS` as light_m<m>_r<r>.R|G|B, half float
 
 The data window is cropped to the object. Half floats end at 65,504, so radiance is stored divided by a power of two
 that the attribute "dreammat_scale" names.
@@ -18,7 +21,10 @@ from torch import Tensor
 
 from stages.core.artifact import ExrImage, read_exr, write_exr
 from stages.core.errors import ArtifactError
-from stages.core.shading import KNOTS, Transport
+from stages.core.shading import KNOTS, LIGHT_MAPS, Transport
+
+SD = "sd"
+"""The profile of the released ControlNet, and the folder of its files within a view's."""
 
 LARGEST_STORED = 32768.0
 """Stored radiance stays at or under this, well inside half float's range."""
@@ -50,17 +56,17 @@ def object_window(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
-def write_geometry(folder: Path, view: int, geometry: Geometry) -> None:
-    """Write view_NNN/geometry.exr."""
+def write_geometry(folder: Path, view: int, geometry: Geometry, profile: str = "") -> None:
+    """Write view_NNN/<profile>/geometry.exr."""
     window = object_window(geometry.mask)
     channels = {"depth": geometry.depth[window], "mask": geometry.mask[window].astype(np.float32)}
     channels |= {f"normal.{c}": geometry.normal[window][..., i] for i, c in enumerate("RGB")}
-    _write(folder / view_folder(view) / "geometry.exr", channels, geometry.mask.shape, window, {})
+    _write(folder / view_folder(view) / profile / "geometry.exr", channels, geometry.mask.shape, window, {})
 
 
-def read_geometry(folder: Path, view: int) -> Geometry:
-    """Read view_NNN/geometry.exr. Raises: ArtifactError."""
-    path = folder / view_folder(view) / "geometry.exr"
+def read_geometry(folder: Path, view: int, profile: str = "") -> Geometry:
+    """Read view_NNN/<profile>/geometry.exr. Raises: ArtifactError."""
+    path = folder / view_folder(view) / profile / "geometry.exr"
     image = read_exr(path)
     names = ["depth", "mask", *(f"normal.{c}" for c in "RGB")]
     _expect(path, image, names)
@@ -74,27 +80,15 @@ def transport_channels() -> list[str]:
     return [*(f"{term}.{c}" for term in terms for c in "RGB"), "cosine"]
 
 
+def light_map_names() -> list[str]:
+    """Names of the six light maps, as channels carry them: light_m0_r0, light_m0_r0.5, ..."""
+    return [f"light_m{m}_r{r:g}" for m, r in LIGHT_MAPS]
+
+
 def write_transport(folder: Path, view: int, environment: str, mask: NDArray[np.bool_], transport: Transport) -> None:
     """Write view_NNN/<environment>.exr; `transport` holds the mask's pixels row by row."""
-    values = transport.packed()
-    largest = float(values.max()) if len(values) else 0.0
-    scale = 2.0 ** max(0, int(np.ceil(np.log2(max(largest, 1.0) / LARGEST_STORED))))
-    values[:, :-1] /= scale
-    window = object_window(mask)
-    inside = mask[window]
-    image = np.zeros((values.shape[1], *inside.shape), np.float16)
-    image[:, inside] = rounded(values).T.contiguous().numpy()
-    channels = dict(zip(transport_channels(), image, strict=True))
     path = folder / view_folder(view) / f"{environment}.exr"
-    _write(path, channels, mask.shape, window, {"dreammat_scale": repr(scale)})
-
-
-def rounded(values: Tensor) -> Tensor:
-    """As half floats with DROPPED bits of the significand rounded away, but for the last column, N·V. Args: (P, WIDTH)."""
-    half = values.half()
-    bits = half[:, :-1].view(torch.int16)
-    bits.add_(1 << (DROPPED - 1)).bitwise_and_(-1 << DROPPED)
-    return half
+    _write_radiance(path, transport_channels(), mask, transport.packed(), plain=1)
 
 
 def read_transport(folder: Path, view: int, environment: str, mask: NDArray[np.bool_]) -> Transport:
@@ -103,21 +97,63 @@ def read_transport(folder: Path, view: int, environment: str, mask: NDArray[np.b
     Raises: ArtifactError.
     """
     path = folder / view_folder(view) / f"{environment}.exr"
+    return Transport.unpack(_read_radiance(path, transport_channels(), mask, plain=1))
+
+
+def write_light_maps(folder: Path, view: int, environment: str, mask: NDArray[np.bool_], maps: Tensor, profile: str) -> None:
+    """Write view_NNN/<profile>/<environment>.exr. Args: maps: (P, 6, 3), of the mask's pixels row by row."""
+    path = folder / view_folder(view) / profile / f"{environment}.exr"
+    _write_radiance(path, _light_map_channels(), mask, maps.flatten(1).clone(), plain=0)
+
+
+def read_light_maps(folder: Path, view: int, environment: str, mask: NDArray[np.bool_], profile: str) -> Tensor:
+    """Light maps of the mask's pixels, (P, 6, 3) as `read_transport`. Raises: ArtifactError."""
+    path = folder / view_folder(view) / profile / f"{environment}.exr"
+    return _read_radiance(path, _light_map_channels(), mask, plain=0).unflatten(1, (-1, 3))
+
+
+def _light_map_channels() -> list[str]:
+    return [f"{name}.{c}" for name in light_map_names() for c in "RGB"]
+
+
+def _write_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], values: Tensor, plain: int) -> None:
+    """Write radiance, changing it. Args: values: (P, channels), of which the last `plain` are no radiance."""
+    scaled = values[:, : values.shape[1] - plain]
+    largest = float(scaled.max()) if len(scaled) else 0.0
+    scale = 2.0 ** max(0, int(np.ceil(np.log2(max(largest, 1.0) / LARGEST_STORED))))
+    scaled /= scale
+    window = object_window(mask)
+    inside = mask[window]
+    image = np.zeros((values.shape[1], *inside.shape), np.float16)
+    image[:, inside] = rounded(values, plain).T.contiguous().numpy()
+    channels = dict(zip(names, image, strict=True))
+    _write(path, channels, mask.shape, window, {"dreammat_scale": repr(scale)})
+
+
+def rounded(values: Tensor, plain: int) -> Tensor:
+    """As half floats with DROPPED bits of the significand rounded away, but for the last `plain` columns. Args: (P, C)."""
+    half = values.half()
+    bits = half[:, : values.shape[1] - plain].view(torch.int16)
+    bits.add_(1 << (DROPPED - 1)).bitwise_and_(-1 << DROPPED)
+    return half
+
+
+def _read_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], plain: int) -> Tensor:
+    """What `_write_radiance` wrote, (P, channels). Raises: ArtifactError."""
     image = read_exr(path)
-    names = transport_channels()
     _expect(path, image, names)
     window = object_window(mask)
     inside = mask[window]
     if image.channels[names[0]].shape != inside.shape or image.display != mask.shape:
         raise ArtifactError(f"{path}: does not cover the object of its geometry.exr; make the conditions again")
-    values = np.stack([image.channels[name][inside] for name in names], 1)  # (P, 3 + 6 K)
+    values = np.stack([image.channels[name][inside] for name in names], 1)
     if not np.isfinite(values).all():
         raise ArtifactError(f"{path}: holds values that are not finite; make the conditions again")
     scale = float(image.attributes.get("dreammat_scale", "1.0"))
     if scale != 1.0:
         values = values.astype(np.float32)
-        values[:, :-1] *= scale
-    return Transport.unpack(torch.from_numpy(values))
+        values[:, : values.shape[1] - plain] *= scale
+    return torch.from_numpy(values)
 
 
 def _write(

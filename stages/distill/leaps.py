@@ -50,13 +50,8 @@ def leaps(
     tried = values[rows]
     tried[:, ROUGHNESS] = torch.rand(len(rows), generator=generator).to(values)
     for _ in range(SOLVES):
-        found = ask(shade(part.transport, as_material(tried)), part)
-        tried = (tried + proposal(part.transport, as_material(tried), found, progress, held=ROUGHNESS)).clamp(0.0, 1.0)
-    after = misfit(ask(shade(part.transport, as_material(tried)), part), len(rows))
+        found = ask(shade(part.transport, Material.of(tried)), part)
+        tried = (tried + proposal(part.transport, Material.of(tried), found, progress, held=ROUGHNESS)).clamp(0.0, 1.0)
+    after = misfit(ask(shade(part.transport, Material.of(tried)), part), len(rows))
     better = after < GAIN * misfit(response, len(values))[rows]
     return rows[better], tried[better]
-
-
-def as_material(values: Tensor) -> Material:
-    """Columns albedo, roughness, metallic."""
-    return Material(values[:, :3], values[:, 3], values[:, 4])

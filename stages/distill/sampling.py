@@ -27,7 +27,8 @@ class Images:
     """How a sample's P points lie in its B square images of S pixels.
 
     pixel: (P,) flat index into B x S x S. surface: depth and normal of the points. azimuth, elevation: (B,) of the
-    cameras, radians, the front of the object at azimuth 0.
+    cameras, radians, the front of the object at azimuth 0. maps: where the conditions have the profile sd, view-space
+    normals (P, 3) and light maps (P, 6, 3) of it.
     """
 
     count: int
@@ -36,6 +37,7 @@ class Images:
     surface: Surface
     azimuth: NDArray[np.float64]
     elevation: NDArray[np.float64]
+    maps: tuple[Tensor, Tensor] | None = None
 
     def paint(self, values: Tensor) -> Tensor:
         """Values (P, C) as images (B, C, S, S), 0 off the object. Differentiable in: values."""
@@ -98,8 +100,19 @@ class CropSampler:
         eyes = self._views.c2w[[view for view, _ in keys], :3, 3]
         azimuth, elevation = np.arctan2(eyes[:, 1], eyes[:, 0]), np.arcsin(eyes[:, 2] / np.linalg.norm(eyes, axis=1))
         where = torch.from_numpy(pixel).to(self._device)
-        images = Images(self._batch, self._size, where, surface, azimuth, elevation)
+        images = Images(self._batch, self._size, where, surface, azimuth, elevation, self._maps(keys, crops))
         return Sample(surface.points, surface.normals, 1, transport, tuple(keys), images=images)
+
+    def _maps(
+        self, keys: list[tuple[int, int]], crops: list[tuple[NDArray[np.int64], NDArray[np.int64]]]
+    ) -> tuple[Tensor, Tensor] | None:
+        """Of the profile sd, as in `Images`."""
+        if not self._views.has_light_maps:
+            return None
+        rows = [torch.from_numpy(rows) for rows, _ in crops]
+        normals = [self._views.smooth_normals(view)[chosen] for (view, _), chosen in zip(keys, rows, strict=True)]
+        lights = [self._views.light_maps(*key)[chosen] for key, chosen in zip(keys, rows, strict=True)]
+        return torch.cat(normals).to(self._device), torch.cat(lights).to(self._device, torch.float32)
 
     def prefetch(self, generator: torch.Generator) -> None:
         self._views.prefetch(self._keys(generator))

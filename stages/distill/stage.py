@@ -76,7 +76,7 @@ def distill(
 
     Raises: InputError, ArtifactError, OutputError, NumericalError; KeyboardInterrupt after saving a checkpoint.
     """
-    device = _device(options)
+    device = chosen_device(options)
     views = Views(conditions)
     guidance = make_guidance(options, views, device)
     budget = Budget(options.steps or guidance.budget.steps, options.learning_rate or guidance.budget.learning_rate)
@@ -178,11 +178,11 @@ def optimisation_step(run: Run) -> float:
     if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
-        losses = _regularizers(material, nearby, run)
+        losses = _regularizers(material, nearby, sample, response, run)
         if response.curvature is None:
             torch.autograd.backward([radiance, *losses], [response.gradient, *[None] * len(losses)])
         else:
-            values = torch.cat([material.albedo, material.roughness[:, None], material.metallic[:, None]], 1)  # (P, 5)
+            values = material.columns()
             goal = _goal(run, response, sample, values.detach(), generator)
             torch.autograd.backward([values, *losses], [logit_gradient(values.detach(), goal), *[None] * len(losses)])
     with clock("optimiser"):
@@ -192,8 +192,7 @@ def optimisation_step(run: Run) -> float:
 
 def _goal(run: Run, response: Response, sample: Sample, values: Tensor, generator: torch.Generator) -> Tensor:
     """Where a response of least squares sends the material of every point: (P, 5)."""
-    material = Material(values[:, :3], values[:, 3], values[:, 4])
-    goal = (values + proposal(sample.transport, material, response, run.progress)).clamp(0.0, 1.0)
+    goal = (values + proposal(sample.transport, Material.of(values), response, run.progress)).clamp(0.0, 1.0)
     if run.progress >= UNTIL:
         return goal
 
@@ -217,13 +216,13 @@ def _materials(
     return Material(*here), Material(*nearby)
 
 
-def _regularizers(material: Material, nearby: Material | None, run: Run) -> list[Tensor]:
+def _regularizers(material: Material, nearby: Material | None, sample: Sample, response: Response, run: Run) -> list[Tensor]:
     """The weighted losses on the material itself."""
-    options, expected = run.options, run.guidance.start
+    options, expected = run.options, response.expected
     losses = []
     if expected is not None:  # words decide what a picture leaves open; a known target needs no such help
         losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(material.metallic))
-        losses.append(options.anchor * regularizers.distance_of_means(material, expected))
+        losses.append(options.anchor * regularizers.distance_of_means(material, sample.points[:, 2], expected))
     if nearby is not None:
         losses.append(options.smoothness * regularizers.smoothness(material, nearby))
     return losses
@@ -257,7 +256,7 @@ def _not_finite(step: int, sample: Sample, views: Views, seed: int) -> str:
     return f"step {step}: the gradient is not finite ({where}, seed {seed}); try a smaller --learning-rate"
 
 
-def _device(options: DistillOptions) -> torch.device:
+def chosen_device(options: DistillOptions) -> torch.device:
     """The torch device asked for, if it works. Raises: InputError."""
     if (options.steps is not None and options.steps < 1) or options.batch < 1:
         raise InputError(f"--steps {options.steps} --batch {options.batch}: expected 1 or more")

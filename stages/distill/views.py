@@ -9,9 +9,11 @@ What is drawn depends on the generator alone, never on what happens to be in mem
 
 import threading
 from collections import OrderedDict
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Generic, TypeVar
 
 import numpy as np
 import torch
@@ -21,8 +23,8 @@ from torch import Tensor
 from stages.core import schemas
 from stages.core.artifact import MANIFEST, load_npz, read_manifest, sha256_file
 from stages.core.errors import ArtifactError
-from stages.core.shading import KNOTS, WIDTH, Transport
-from stages.core.views import read_geometry, read_transport
+from stages.core.shading import KNOTS, LIGHT_MAPS, WIDTH, Transport
+from stages.core.views import SD, read_geometry, read_light_maps, read_transport
 
 CACHE_BYTES = 2 << 30
 """Memory that light transport may take."""
@@ -31,6 +33,8 @@ READERS = 2
 """Threads that read view files."""
 
 HALF_MAX = 65504.0
+
+Light = TypeVar("Light", Transport, Tensor)
 
 
 @dataclass(frozen=True)
@@ -66,13 +70,16 @@ class Views:
         self.width, self.height = int(cameras["width"]), int(cameras["height"])
         self.environments: list[str] = list(provenance.extra["environments"])
         self.to_world = np.array(provenance.extra.get("to_world", np.eye(4).ravel()), np.float64).reshape(4, 4)
+        self.has_light_maps = provenance.extra.get("profile") == SD
         if tuple(provenance.extra["knots"]) != KNOTS:
             raise ArtifactError(f"{folder}: roughness knots differ from this version's; make the conditions again")
         self._geometry = self._read_geometry()
+        self._smooth: dict[int, Tensor] = {}
         self.seen = [view for view, geometry in enumerate(self._geometry) if len(geometry.pixels)]
         if not self.seen:
             raise ArtifactError(f"{folder}: no view shows the object; make the conditions again with other cameras")
-        self._cache = _Cache(self.read_transport, cache_bytes)
+        self._cache = _Cache(self.read_transport, cache_bytes, 2 * WIDTH)
+        self._maps = _Cache(self._read_maps, cache_bytes // 2, 2 * 3 * len(LIGHT_MAPS))
 
     def pixels(self, view: int) -> NDArray[np.int32]:
         """Flat index in the image of each object pixel of a view, ascending (P,)."""
@@ -100,10 +107,23 @@ class Views:
         """Light transport of all object pixels of a view, float16."""
         return self._cache.get((view, environment))
 
+    def light_maps(self, view: int, environment: int) -> Tensor:
+        """Light maps of the profile sd, of all object pixels of a view, (P, 6, 3) float16."""
+        return self._maps.get((view, environment))
+
+    def smooth_normals(self, view: int) -> Tensor:
+        """View-space normals of the profile sd, of all object pixels of a view, (P, 3) float32."""
+        if view not in self._smooth:
+            normal = read_geometry(self.folder, view, SD).normal.reshape(-1, 3)[self.pixels(view)]
+            self._smooth[view] = torch.from_numpy(np.ascontiguousarray(normal))
+        return self._smooth[view]
+
     def prefetch(self, keys: list[tuple[int, int]]) -> None:
-        """Start reading the transport of (view, environment) pairs in the background."""
+        """Start reading the light of (view, environment) pairs in the background."""
         for key in keys:
             self._cache.prefetch(key)
+            if self.has_light_maps:
+                self._maps.prefetch(key)
 
     def _read_geometry(self) -> list[_Geometry]:
         def read(view: int) -> _Geometry:
@@ -120,19 +140,31 @@ class Views:
     def read_transport(self, key: tuple[int, int]) -> Transport:
         """As `transport` of a (view, environment), always from disk and not kept."""
         view, environment = key
-        mask = np.zeros((self.height, self.width), bool)
-        mask.ravel()[self._geometry[view].pixels] = True
-        transport = read_transport(self.folder, view, self.environments[environment], mask)
+        transport = read_transport(self.folder, view, self.environments[environment], self._mask(view))
         return Transport.unpack(transport.packed().clamp(max=HALF_MAX).half())
 
+    def _read_maps(self, key: tuple[int, int]) -> Tensor:
+        view, environment = key
+        maps = read_light_maps(self.folder, view, self.environments[environment], self._mask(view), SD)
+        return maps.clamp(max=HALF_MAX).half()
 
-class _Cache:
-    """Transports by (view, environment), the least recently used dropped first; safe to use from several threads."""
+    def _mask(self, view: int) -> NDArray[np.bool_]:
+        mask = np.zeros((self.height, self.width), bool)
+        mask.ravel()[self._geometry[view].pixels] = True
+        return mask
 
-    def __init__(self, read, limit: int) -> None:  # type: ignore[no-untyped-def]
-        self._read, self._limit, self._bytes = read, limit, 0
-        self._held: OrderedDict[tuple[int, int], Transport] = OrderedDict()
-        self._coming: dict[tuple[int, int], Future[Transport]] = {}
+
+class _Cache(Generic[Light]):
+    """What lights the pixels, by (view, environment), the least recently used dropped first; safe from several threads.
+
+    pixel: bytes of a pixel.
+    """
+
+    def __init__(self, read: Callable[[tuple[int, int]], Light], limit: int, pixel: int) -> None:
+        self._read: Callable[[tuple[int, int]], Light] = read
+        self._limit, self._pixel, self._bytes = limit, pixel, 0
+        self._held: OrderedDict[tuple[int, int], Light] = OrderedDict()
+        self._coming: dict[tuple[int, int], Future[Light]] = {}
         self._lock = threading.Lock()
         self._pool = ThreadPoolExecutor(READERS)
 
@@ -141,20 +173,19 @@ class _Cache:
             if key not in self._held and key not in self._coming:
                 self._coming[key] = self._pool.submit(self._read, key)
 
-    def get(self, key: tuple[int, int]) -> Transport:
+    def get(self, key: tuple[int, int]) -> Light:
         with self._lock:
             if key in self._held:
                 self._held.move_to_end(key)
                 return self._held[key]
             coming = self._coming.pop(key, None)
-        transport = coming.result() if coming else self._read(key)
+        light = coming.result() if coming else self._read(key)
         with self._lock:
-            self._held[key] = transport
-            self._bytes += _size(transport)
+            self._held[key] = light
+            self._bytes += self._size(light)
             while self._bytes > self._limit and len(self._held) > 1:
-                self._bytes -= _size(self._held.popitem(last=False)[1])
-        return transport
+                self._bytes -= self._size(self._held.popitem(last=False)[1])
+        return light
 
-
-def _size(transport: Transport) -> int:
-    return 2 * WIDTH * len(transport.E)
+    def _size(self, light: Light) -> int:
+        return self._pixel * len(light.E if isinstance(light, Transport) else light)

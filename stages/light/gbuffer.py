@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stages.core.albedo import MIN_COSINE
 from stages.core.frames import camera_rays
-from stages.light.scene import Scene
+from stages.light.scene import Hits, Scene
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,22 @@ def trace_view(scene: Scene, c2w: NDArray, fov_y: float, width: int, height: int
     """
     origins, directions = camera_rays(c2w, fov_y, width, height)
     hits = scene.intersect(origins, directions)
+    return surface_points(scene, hits, directions, hits.mask.reshape(height, width))
+
+
+def surface_points(scene: Scene, hits: Hits, directions: NDArray, mask: NDArray[np.bool_]) -> GBuffer:
+    """The points that rays hit, in their order, as pixels of a view. Args: directions: (R, 3). mask: (H, W), as many as hit."""
     seen = hits.mask
+    depth = np.zeros(mask.shape, np.float32)
+    depth[mask] = hits.t[seen]
     triangle, barycentric = hits.triangle[seen], hits.barycentric[seen]
     wo = -directions[seen] / np.linalg.norm(directions[seen], axis=-1, keepdims=True)
     ng = scene.geometric_normal(triangle)
     side = np.where((ng * wo).sum(-1) >= 0, 1.0, -1.0)
     n = facing(scene.shading_normal(triangle, barycentric) * side[:, None], wo)
     return GBuffer(
-        mask=seen.reshape(height, width),
-        depth=hits.t.reshape(height, width),
+        mask=mask,
+        depth=depth,
         point=scene.point(triangle, barycentric),
         origin=scene.ray_origin(triangle, barycentric, side),
         n=n,

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.light.gbuffer import GBuffer
+from stages.light.light_set import CHANNELS
 
 RADIUS = 2
 """Of the window, pixels: it holds every class of a 4 x 4 block of interleaved samples at least once."""
@@ -25,6 +26,10 @@ RADIUS = 2
 TOLERANCE = 12.0
 """A neighbour counts for nothing when its squared difference exceeds this many times the sum of both variances; its own
 is taken for no more than the point's, so that noise does not flow to where there is none."""
+
+TOGETHER = 8.0
+"""Nor does it count when the squared differences of the first sum, diffuse light, exceed this many times what noise explains,
+on average over all lights and colours: what stands in the way of one light stands in the way of others."""
 
 NORMALS = 100.0
 """Squared difference of unit normals, inverse, at which a neighbour counts for nothing: 7 degrees."""
@@ -149,6 +154,20 @@ def _alike(mean, noise, p, q, k):  # type: ignore[no-untyped-def]
 
 
 @fast
+def _alike_together(mean, noise, p, q):  # type: ignore[no-untyped-def]
+    """How far noise explains the differences of the first sum at two points, taken together, 0 to 1."""
+    f32 = np.float32
+    excess, count = f32(0), 0
+    for k in range(min(CHANNELS, mean.shape[1])):
+        allowed = noise[p, k] + min(noise[p, k], noise[q, k])
+        if allowed > f32(0):
+            difference = mean[p, k] - mean[q, k]
+            excess += difference * difference / allowed
+            count += 1
+    return max(f32(0), f32(1) - excess / (f32(TOGETHER) * f32(max(count, 1))))
+
+
+@fast
 def _average(mean, noise, values, power, index, pixel, n, point, start, end, result):  # type: ignore[no-untyped-def]
     """Sum of w^power values over the sum of w, to that power."""
     f32 = np.float32
@@ -165,6 +184,8 @@ def _average(mean, noise, values, power, index, pixel, n, point, start, end, res
                 if q < 0 or q == p:
                     continue
                 same = _same(n, point, p, q)
+                if same > f32(0):
+                    same *= _alike_together(mean, noise, p, q)
                 if same <= f32(0):
                     continue
                 for k in range(size):

@@ -3,6 +3,9 @@
 Each texel is cut into subdivision x subdivision cells; at each cell's centre the bilinear radiance, the BRDF and a
 shadow ray are evaluated and summed. Nothing is sampled, split, filtered or shared. A mirror (roughness 0) is a delta
 and is looked up once.
+
+`reference_light_maps` does the same for Blender's light maps and their bounce: a cell in which the surface stands shows what
+that point of it reflects, by the same sum.
 """
 
 import numpy as np
@@ -10,9 +13,10 @@ import torch
 from numpy.typing import NDArray
 
 from stages.core.brdf import alpha_from_roughness
-from stages.core.shading import F0, KNOTS, Transport
+from stages.core.shading import F0, KNOTS, LIGHT_MAPS, Transport
+from stages.light.blender import F0 as BLENDER_F0
 from stages.light.environment import Environment, directions_of_texels, lookup
-from stages.light.gbuffer import GBuffer
+from stages.light.gbuffer import GBuffer, surface_points
 from stages.light.scene import Scene
 
 
@@ -77,3 +81,69 @@ def _mirror(
     radiance = lookup(environment.radiance, wi)[0] * (not scene.occluded(origin[None], wi)[0])
     s = (1 - n_v) ** 5
     return (1 - s) * radiance, s * radiance
+
+
+def reference_light_maps(
+    scene: Scene, points: GBuffer, environment: Environment, subdivision: int, pixels: NDArray, bounce: bool = True
+) -> NDArray[np.float64]:
+    """The light maps of `stages.light.blender` at some points of a view, (N, 6, 3). Arguments as `reference_transport`."""
+    height, width, _ = environment.radiance.shape
+    directions, row_angle = directions_of_texels(height * subdivision, width * subdivision)
+    wi, angle = directions.reshape(-1, 3), np.repeat(row_angle, width * subdivision)
+    return np.stack([_light_maps(scene, points, int(i), environment, wi, angle, bounce) for i in pixels])
+
+
+def _light_maps(
+    scene: Scene, points: GBuffer, i: int, environment: Environment, wi: NDArray, angle: NDArray, bounce: bool
+) -> NDArray[np.float64]:
+    """(6, 3) at point i."""
+    n, wo = points.n[i].astype(np.float64), points.wo[i].astype(np.float64)
+    above = wi @ n > 0
+    shown = _shown(scene, points.origin[i], environment, wi[above], bounce)  # (D, 6, 3)
+    mirror = 2 * float(wo @ n) * n - wo
+    reflected = _shown(scene, points.origin[i], environment, mirror[None], bounce)[0]  # (6, 3)
+    maps = np.zeros((len(LIGHT_MAPS), 3))
+    for j, (metallic, roughness) in enumerate(LIGHT_MAPS):
+        diffuse, glossy, fresnel = _principled(n, wo, wi[above], roughness)
+        weight = glossy if metallic else diffuse + fresnel * glossy
+        maps[j] = (weight * angle[above]) @ shown[:, j]
+        if roughness == 0:
+            maps[j] += reflected[j] * (1.0 if metallic else _dielectric(float(wo @ n)))
+    return maps
+
+
+def _shown(
+    scene: Scene, origin: NDArray, environment: Environment, wi: NDArray, bounce: bool
+) -> NDArray[np.float64]:
+    """What a point sees along directions (D, 3), for each map: the light, or what the surface there reflects of it."""
+    hits = scene.intersect(np.broadcast_to(origin, wi.shape), wi)
+    result = np.repeat(lookup(environment.radiance, wi)[:, None] * ~hits.mask[:, None, None], len(LIGHT_MAPS), 1)
+    if bounce and hits.mask.any():
+        there = surface_points(scene, hits, wi, hits.mask[None])
+        result[hits.mask] = reference_light_maps(scene, there, environment, 1, np.arange(len(there.n)), bounce=False)
+    return result
+
+
+def _principled(n: NDArray, wo: NDArray, wi: NDArray, roughness: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Burley's lobe and D G / (4 N·V), times N·L, and Fresnel's factor, along directions (D, 3)."""
+    n_l, n_v = wi @ n, float(wo @ n)
+    wm = wi + wo
+    wm = wm / np.linalg.norm(wm, axis=-1, keepdims=True)
+    v_h = wm @ wo
+    bend = 2 * roughness * v_h**2 - 0.5
+    diffuse = (1 + bend * (1 - n_l) ** 5) * (1 + bend * (1 - n_v) ** 5) * n_l / np.pi
+    if roughness == 0:
+        return diffuse, np.zeros_like(diffuse), np.zeros_like(diffuse)
+    a2 = alpha_from_roughness(roughness) ** 2
+    D = a2 / (np.pi * ((np.cross(wm, n) ** 2).sum(-1) + a2 * (wm @ n) ** 2) ** 2)
+    lambda_o, lambda_i = (0.5 * (np.sqrt(1 + a2 * (1 - c**2) / c**2) - 1) for c in (n_v, n_l))
+    return diffuse, D / (1 + lambda_o + lambda_i) / (4 * n_v), _dielectric(v_h)
+
+
+def _dielectric(cosine: NDArray | float) -> NDArray:
+    """Fresnel reflectance of the index of refraction that reflects BLENDER_F0 head-on, by its two polarisations."""
+    c = np.asarray(cosine, np.float64)
+    eta = (1 + BLENDER_F0**0.5) / (1 - BLENDER_F0**0.5)
+    inside = np.sqrt(1 - (1 - c**2) / eta**2)
+    parallel, across = (eta * c - inside) / (eta * c + inside), (c - eta * inside) / (c + eta * inside)
+    return (parallel**2 + across**2) / 2

@@ -54,6 +54,21 @@ class Scene:
         o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
         return self._embree.run(o, d, query="OCCLUDED") >= 0
 
+    def shaded_smooth(self) -> "Scene":
+        """The same mesh with normals that are smooth over every edge: at a vertex, its faces' by the angle they have there.
+
+        What Blender calls Shade Smooth; where they cancel out, a corner keeps its face's.
+        """
+        corners = self.vertices[self.triangles].astype(np.float64)  # (F, 3, 3)
+        out, back = np.roll(corners, -1, 1) - corners, np.roll(corners, 1, 1) - corners
+        angle = np.arctan2(np.linalg.norm(np.cross(out, back), axis=-1), (out * back).sum(-1))
+        face = self.geometric_normal(np.arange(len(self.triangles)))[:, None]  # (F, 1, 3)
+        weighted, vertex = (angle[..., None] * face).reshape(-1, 3), self.triangles.ravel()
+        total = np.stack([np.bincount(vertex, weighted[:, k], len(self.vertices)) for k in range(3)], -1)
+        length = np.linalg.norm(total, axis=-1, keepdims=True)
+        smooth = (total / np.where(length > 1e-6, length, 1))[self.triangles]
+        return Scene(self.vertices, self.triangles, np.where((length > 1e-6)[self.triangles], smooth, face))
+
     def geometric_normal(self, triangle: NDArray) -> NDArray[np.float32]:
         """Unit normal of each triangle, by its winding. Args: (P,). Returns: (P, 3); zero for a degenerate one."""
         a, b, c = (self.vertices[self.triangles[triangle, k]].astype(np.float64) for k in range(3))

@@ -25,7 +25,6 @@ Source: Veach 1997, ch. 9 (MIS); Křivánek & Colbert 2008, "Real-time Shading w
 Heidrich 2001, "Interleaved Sampling".
 """
 
-import functools
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -34,7 +33,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from stages.core.albedo import MIN_COSINE, cosines, diffuse_table, specular_albedo
+from stages.core.albedo import MIN_COSINE
 from stages.core.brdf import alpha_from_roughness
 from stages.core.frames import tangent_frame
 from stages.core.shading import KNOTS, Transport
@@ -43,44 +42,33 @@ from stages.light.environment import Environment, lookup
 from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
+from stages.light.terms import GLTF, Terms
 from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts
 
 TILE = 512
 """Points a thread takes at once: their rays stay in its cache."""
 
-STORED = 2 * len(KNOTS) + 1
-"""Sums a point keeps: E, then A and B of every knot."""
-
-MIRROR = (1, 1 + len(KNOTS))
-"""Where among them roughness 0 is. It is looked up, not summed."""
-
-JUDGED = [0, 1 + KNOTS.index(0.5), 1 + KNOTS.index(1.0)]
-"""E and A at roughness 0.5 and 1, by which noise is judged: all that a picture of a rough thing is made of."""
-
-SHARP = [m + 1 for m in MIRROR]
-"""The least rough lobe, which shows edges that no neighbour knows of: left as it was traced."""
-
-SUMMED = np.array([j for j in range(STORED) if j not in MIRROR])
-
-
 @dataclass(frozen=True)
 class Quality:
     """How many rays a point traces: `lobe` for the mixture of lobes, `light` for the excess of an average environment.
 
-    The noisiest points trace more, see EXTRA, and what noise is left is smoothed, unless switched off.
+    The noisiest points trace more, see EXTRA, and what noise is left is smoothed, unless switched off. averaged: the caller
+    averages over points; each then draws samples of its own, and what is exact in an even light but biased with a handful of
+    rays is left out: sums are not normalised by their weights, and the light is not prefiltered.
     """
 
     lobe: int
     light: int
     extra: bool = True
     smooth: bool = True
+    averaged: bool = False
 
     def scaled(self, factor: float) -> "Quality":
         """About `factor` times as many rays."""
         return replace(self, lobe=max(2, round(self.lobe * factor)), light=max(2, round(self.light * factor)))
 
 
-EXTRA = ((0.1, 3.0), (0.012, 12.0))
+EXTRA = ((0.15, 3.0), (0.02, 14.0))
 """Rounds of further rays: for which share of the points, the noisiest by then, and how many times what all began with."""
 
 SEED_STEP = 0x5EED
@@ -89,10 +77,7 @@ SEED_STEP = 0x5EED
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
 
-QUALITY = {"draft": Quality(20, 8), "standard": Quality(44, 18), "high": Quality(240, 100)}
-
-LOBE_SHARES = np.array([0.22, 0.03, 0.05, 0.08, 0.11, 0.14, 0.14, 0.12, 0.11])
-"""Share of the lobe rays: the cosine lobe, then each knot but the mirror."""
+QUALITY = {"draft": Quality(16, 8), "standard": Quality(32, 16), "high": Quality(256, 128)}
 
 AIM = np.array([alpha_from_roughness(r) for r in (0.5, 1.0)], np.float32)
 """Glossy lobes that light rays are aimed for, beside the diffuse one."""
@@ -100,7 +85,7 @@ AIM = np.array([alpha_from_roughness(r) for r in (0.5, 1.0)], np.float32)
 
 @dataclass(frozen=True)
 class Sums:
-    """What a point gathers, for all environments: (P, STORED, CHANNELS) float32, and the variance of each.
+    """What a point gathers, for all environments: (P, stored, CHANNELS) float32, and the variance of each.
 
     rays: (P,) float32, traced for a point, as a multiple of what every point begins with.
     """
@@ -141,15 +126,8 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
     """`light_transport` for lights that are already split."""
     near = reconstruction.Neighbours.of(points)
-    sums = trace(scene, points, lights, quality, seed)
-    for i, (share, factor) in enumerate(EXTRA if quality.extra else (), 1):
-        judged = sums.mean[:, JUDGED], sums.variance[:, JUDGED]
-        worst = reconstruction.noisiest(*judged, near, int(share * len(points.n)))
-        add(sums, worst, trace(scene, points[worst], lights, quality.scaled(factor), seed + i * SEED_STEP), factor)
-    mean = sums.mean
-    if quality.smooth:
-        sums.variance[:, SHARP] = 0
-        mean = reconstruction.smoothed(mean, sums.variance, near)
+    sums = gather(scene, points, lights, quality, seed, near)
+    mean = smoothed(sums, near) if quality.smooth else sums.mean
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
     return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
 
@@ -157,6 +135,31 @@ def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality,
 def _transport(sums: NDArray, cosine: torch.Tensor) -> Transport:
     E, A, B = torch.from_numpy(sums).split([1, len(KNOTS), len(KNOTS)], 1)
     return Transport(E[:, 0], A, B, cosine)
+
+
+def gather(
+    scene: Scene,
+    points: GBuffer,
+    lights: LightSet,
+    quality: Quality,
+    seed: int,
+    near: reconstruction.Neighbours,
+    terms: Terms = GLTF,
+) -> Sums:
+    """The sums of every point, with further rays where they are noisiest."""
+    sums = trace(scene, points, lights, quality, seed, terms)
+    for i, (share, factor) in enumerate(EXTRA if quality.extra else (), 1):
+        judged = sums.mean[:, terms.judged], sums.variance[:, terms.judged]
+        worst = reconstruction.noisiest(*judged, near, int(share * len(points.n)))
+        more = trace(scene, points[worst], lights, quality.scaled(factor), seed + i * SEED_STEP, terms)
+        add(sums, worst, more, factor)
+    return sums
+
+
+def smoothed(sums: Sums, near: reconstruction.Neighbours, terms: Terms = GLTF) -> NDArray[np.float32]:
+    """The sums with their noise averaged away, (P, stored, CHANNELS); forgets the variance of the sharp ones."""
+    sums.variance[:, terms.sharp] = 0
+    return reconstruction.smoothed(sums.mean, sums.variance, near)
 
 
 def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
@@ -167,14 +170,14 @@ def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
     sums.rays[rows] += factor
 
 
-def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> Sums:
+def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int, terms: Terms = GLTF) -> Sums:
     """The sums of every point by Monte Carlo, each on its own."""
-    mean, gap = np.zeros((2, len(points.n), STORED, CHANNELS), np.float32)
-    rays = Rays.plan(quality, lights, seed)
+    mean, gap = np.zeros((2, len(points.n), terms.stored, CHANNELS), np.float32)
+    rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
-        list(pool.map(lambda part: _tile(scene, points, lights, rays, pixel[part], part, mean, gap), parts))
+        list(pool.map(lambda part: _tile(scene, points, lights, terms, rays, pixel[part], part, mean, gap), parts))
     variance = reconstruction.variance(gap, reconstruction.Neighbours.of(points))
     return Sums(mean, variance, np.ones(len(mean), np.float32))
 
@@ -183,6 +186,7 @@ def _tile(
     scene: Scene,
     points: GBuffer,
     lights: LightSet,
+    terms: Terms,
     rays: "Rays",
     pixel: NDArray,
     part: NDArray,
@@ -191,32 +195,28 @@ def _tile(
 ) -> None:
     """The sums of a tile's points, written to rows `part` of `mean` and `gap`."""
     n, wo, origin, cells = points.n[part], points.wo[part], points.origin[part], lights.cells
-    frame = (n, *tangent_frame(n))
-    alphas, count, slots = knot_alphas(), len(part), len(rays.slots)
-    chosen, aimed = np.empty((2, count, len(cells.energy)), np.float32)
+    frame, alphas = (n, *tangent_frame(n)), terms.alphas
+    chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
     aim(n, wo, AIM, (cells.direction, cells.energy), cells.first, chosen, aimed)
-    directions, owner = np.empty((count * slots, 3), np.float32), np.empty(count * slots, np.int32)
-    row = np.empty((count, slots), np.int32)
-    excess = (lights.texels, lights.cumulative, cells.begin, cells.first)
-    samples = (rays.slots, rays.shift, rays.turn, rays.seed)
-    used = draw(*frame, wo, pixel, samples, alphas, excess, chosen, directions, owner, row)
-    directions = directions[:used]
-    occluded = scene.occluded(origin[owner[:used]], directions)
+    directions, owner, row = rays.draw(frame, wo, pixel, alphas, lights, chosen)
+    occluded = scene.occluded(origin[owner], directions)
     seen = (lights.pyramid, lights.level_start, lights.fine, lights.block, rays.density, cells.number, aimed)
-    counts = (rays.counts, rays.bounds)
-    accumulate(*frame, wo, alphas, counts, row, directions, occluded, albedo_table(), seen, (part, SUMMED), mean, gap)
+    sampled = (rays.counts, rays.bounds, terms.principled)
+    where = (part, terms.summed)
+    accumulate(*frame, wo, alphas, sampled, row, directions, occluded, rays.table, seen, where, mean, gap)
     mirror = row[:, -1]
-    _mirror(n, wo, directions[mirror], ~occluded[mirror], lights, part, mean)
+    _mirror(n, wo, directions[mirror], ~occluded[mirror], lights, terms, part, mean)
 
 
 def _mirror(
-    n: NDArray, wo: NDArray, wi: NDArray, visible: NDArray, lights: LightSet, part: NDArray, mean: NDArray
+    n: NDArray, wo: NDArray, wi: NDArray, visible: NDArray, lights: LightSet, terms: Terms, part: NDArray, mean: NDArray
 ) -> None:
-    s = (1 - (n * wo).sum(-1, keepdims=True).astype(np.float64).clip(0, 1)) ** 5
+    cosine = (n * wo).sum(-1, keepdims=True).astype(np.float64).clip(0, 1)
+    weights = terms.mirror_weights(cosine)
     for e, environment in enumerate(lights.environments):
         radiance = lookup(environment.radiance, wi) * visible[:, None]
-        mean[part, MIRROR[0], 3 * e : 3 * e + 3] = (1 - s) * radiance
-        mean[part, MIRROR[1], 3 * e : 3 * e + 3] = s * radiance
+        for slot, weight in zip(terms.mirror, weights, strict=True):
+            mean[part, slot, 3 * e : 3 * e + 3] = weight * radiance
 
 
 def tiles(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -238,6 +238,7 @@ class Rays:
     its lobe, rays of that lobe, place among all light rays. bounds: first slot of the first half's lobe rays, its light
     rays, the second half's lobe rays, its light rays, and their end. shift: (CLASSES, 2). turn: (CLASSES, S, 2), cosine
     and sine of a lobe sample's azimuth. density: of a `LightSet`, times each environment's rays.
+    table: open-point albedo of `Terms`, without rows for averaged points. jitter: by which points of one class differ.
     """
 
     counts: NDArray[np.int64]
@@ -246,11 +247,13 @@ class Rays:
     shift: NDArray[np.float64]
     turn: NDArray[np.float32]
     density: NDArray[np.float32]
+    table: NDArray[np.float32]
+    jitter: float
     seed: int
 
     @staticmethod
-    def plan(quality: Quality, lights: LightSet, seed: int) -> "Rays":
-        counts = lobe_counts(quality.lobe)
+    def plan(quality: Quality, lights: LightSet, seed: int, terms: Terms = GLTF) -> "Rays":
+        counts = terms.counts(quality.lobe)
         light_counts = share_out(quality.light, lights)
         lobe = _slots(counts, 0)
         light = _slots(light_counts, len(counts))
@@ -263,7 +266,26 @@ class Rays:
         turn = np.stack([np.cos(azimuth), np.sin(azimuth)], -1).astype(np.float32)
         density = lights.density * np.pad(light_counts, (0, MAX_LIGHTS - len(light_counts))).astype(np.float32)
         assert turn.shape == (CLASSES, len(slots), 2)
-        return Rays(counts, slots, bounds, shift, turn, density, seed)
+        table, jitter = (terms.albedo()[:0], 1.0) if quality.averaged else (terms.albedo(), 1 / CLASSES)
+        return Rays(counts, slots, bounds, shift, turn, density, table, jitter, seed)
+
+    def draw(
+        self,
+        frame: tuple[NDArray, NDArray, NDArray],
+        wo: NDArray,
+        pixel: NDArray,
+        alphas: NDArray,
+        lights: LightSet,
+        chosen: NDArray,
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
+        """Directions (R, 3) of a tile's points, the point (R,) that each belongs to, and its row (P, S), -1 for none."""
+        count, slots = len(wo), len(self.slots)
+        directions, owner = np.empty((count * slots, 3), np.float32), np.empty(count * slots, np.int32)
+        row = np.empty((count, slots), np.int32)
+        excess = (lights.texels, lights.cumulative, lights.cells.begin, lights.cells.first)
+        samples = (self.slots, self.shift, self.turn, self.jitter, self.seed)
+        used = draw(*frame, wo, pixel, samples, alphas, excess, chosen, directions, owner, row)
+        return directions[:used], owner[:used], row
 
 
 def share_out(light: int, lights: LightSet) -> NDArray[np.int64]:
@@ -271,6 +293,8 @@ def share_out(light: int, lights: LightSet) -> NDArray[np.int64]:
 
     EVEN of them go to all alike, for the penumbrae of suns, the rest by demand.
     """
+    if light == 0:
+        return np.zeros(len(lights.environments), np.int64)
     has_excess = np.diff(lights.cells.first) > 0
     demand = np.where(has_excess, lights.demand + 1e-9, 0.0)
     shares = demand / max(demand.sum(), np.finfo(float).tiny) * has_excess.sum()
@@ -282,21 +306,3 @@ def _slots(counts: NDArray, first: int) -> NDArray[np.int64]:
     rows = [(first + j, i, count) for j, count in enumerate(counts) for i in range(count)]
     table = np.array(rows, np.int64).reshape(-1, 3)
     return np.c_[table, np.arange(len(table))]
-
-
-def lobe_counts(total: int) -> NDArray[np.int64]:
-    """Rays of the cosine lobe and of each knot's lobe: an even number, for two halves, and not 0."""
-    return 2 * np.maximum(1, np.round(LOBE_SHARES * total / 2)).astype(np.int64)
-
-
-def knot_alphas() -> NDArray[np.float32]:
-    """alpha of every knot but the mirror's."""
-    return np.array([alpha_from_roughness(r) for r in KNOTS[1:]], np.float32)
-
-
-@functools.lru_cache(maxsize=1)
-def albedo_table() -> NDArray[np.float32]:
-    """Open-point albedo of each sum: (COSINE_STEPS, SUMMED) float32, in the order of `accumulate`."""
-    cosine = torch.from_numpy(cosines().astype(np.float32))
-    knots = [specular_albedo(torch.full_like(cosine, roughness), cosine).numpy() for roughness in KNOTS[1:]]
-    return np.stack([diffuse_table(), *(k[:, 0] for k in knots), *(k[:, 1] for k in knots)], -1)

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.albedo import COSINE_STEPS, MIN_COSINE
+from stages.light.blender import F0, burley, fresnel
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
 from stages.light.octahedral import square_to_direction
 
@@ -99,14 +100,14 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
 
     Args:
         n, t, b, wo: (P, 3) world. pixel: (P, 2), its class and its number in the image.
-        samples: slots, shift, turn and seed of `Rays`. alphas: of the lobes after the cosine.
+        samples: slots, shift, turn, jitter and seed of `Rays`. alphas: of the lobes after the cosine.
         excess: texels and cumulative of a `LightSet`, begin and first of its cells. chosen: of `aim`.
         directions: (P S, 3), owner: (P S,), row: (P, S), written; row is -1 for a direction under the horizon.
     Returns:
         Rows written.
     """
     f32 = np.float32
-    slots, shift, turn, seed = samples
+    slots, shift, turn, spread, seed = samples
     points, knots = len(n), len(alphas)
     lobes = knots + 1
     view = np.empty((lobes, points, 3), np.float32)  # stretched by each alpha, see core.brdf.sample_vndf
@@ -120,7 +121,7 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
             a = alphas[k]
             s = f32(1) / math.sqrt((x * x + y * y) * a * a + z * z)
             view[k + 1, p, 0], view[k + 1, p, 1], view[k + 1, p, 2] = x * a * s, y * a * s, z * s
-        jitter[p] = hashed(pixel[p, 1], seed) / CLASSES
+        jitter[p] = hashed(pixel[p, 1], seed) * spread
     cell, within = _choose_cells(pixel, samples, excess, chosen, lobes, jitter)
     used = 0
     for s in range(len(slots)):
@@ -171,7 +172,7 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
 @fast
 def _choose_cells(pixel, samples, excess, chosen, lobes, jitter):  # type: ignore[no-untyped-def]
     """The cell of each light ray, or -1, and how far into that cell's share its sample lies: (P, light rays) each."""
-    slots, shift, _, seed = samples
+    slots, shift, _, _, seed = samples
     first = excess[3]
     points, rays = len(pixel), 0
     for s in range(len(slots)):
@@ -235,29 +236,121 @@ def arctan_turns(y, x):  # type: ignore[no-untyped-def]
 
 
 @fast
+def weigh(  # type: ignore[no-untyped-def]
+    n, t, b, wo, p, wi, count, alphas, counts, principled, scratch, density, inverse, weight
+):
+    """How much of each sum a ray of point p stands for: the BRDF over the density of all lobe rays that could have been it.
+
+    Args:
+        n, t, b, wo: (P, 3) world. wi: three components, (S,) each, of which the first `count` are read.
+        alphas: of the glossy lobes. counts: rays of each lobe. principled: of `Terms`. scratch: four times (S,).
+        density: (S,), written: of the lobe rays, in rays per steradian. inverse: (S,), written: 1 / density.
+        weight: (sums, count), written.
+    """
+    f32 = np.float32
+    dx, dy, dz = wi
+    s5, sin2, cos2, tan2 = scratch
+    knots = len(alphas)
+    blender, departure, reflection = principled[0], f32(principled[1]), f32(principled[2])
+    ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
+    nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
+    tx, ty, tz = t[p, 0], t[p, 1], t[p, 2]
+    bx, by, bz = b[p, 0], b[p, 1], b[p, 2]
+    wo_z = max(ox * nx + oy * ny + oz * nz, f32(MIN_COSINE * 0.5))
+    tan2_o = (f32(1) - min(wo_z, f32(1)) ** 2) / (wo_z * wo_z)
+    for i in range(count):
+        wi_z = max(dx[i] * nx + dy[i] * ny + dz[i] * nz, f32(1e-7))
+        hx, hy, hz = dx[i] + ox, dy[i] + oy, dz[i] + oz
+        norm = f32(1) / math.sqrt(hx * hx + hy * hy + hz * hz)
+        hx, hy, hz = hx * norm, hy * norm, hz * norm
+        c = max(f32(1) - (hx * dx[i] + hy * dy[i] + hz * dz[i]), f32(0))
+        mx = hx * tx + hy * ty + hz * tz
+        my = hx * bx + hy * by + hz * bz
+        mz = hx * nx + hy * ny + hz * nz
+        s5[i] = c * c * c * c * c
+        sin2[i], cos2[i] = mx * mx + my * my, mz * mz
+        tan2[i] = (f32(1) - wi_z * wi_z) / (wi_z * wi_z)
+        density[i] = f32(counts[0]) * wi_z * f32(1 / math.pi)
+        weight[0, i] = f32(0.96) * (f32(1) - s5[i]) * wi_z * f32(1 / math.pi)
+    if blender:
+        for i in range(count):
+            wi_z = density[i] * f32(math.pi / counts[0])
+            cosine = f32(1) - s5[i] ** f32(0.2)
+            s5[i] = fresnel(cosine)
+            weight[0, i] = burley(wo_z, wi_z, cosine, f32(0), departure)
+            for k in range(knots):
+                weight[1 + k, i] = burley(wo_z, wi_z, cosine, f32(math.sqrt(alphas[k])), departure)
+    for k in range(knots):
+        a2 = alphas[k] * alphas[k]
+        lambda_o = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) - f32(1))
+        scale = f32(0.25) * a2 / (f32(math.pi) * wo_z)
+        share = f32(counts[k + 1]) / (f32(1) + lambda_o)
+        masking = f32(0.5) + lambda_o
+        for i in range(count):
+            q = sin2[i] + a2 * cos2[i]
+            D = scale / (q * q)
+            f = D / (masking + f32(0.5) * math.sqrt(f32(1) + a2 * tan2[i]))
+            density[i] += share * D
+            if blender:
+                weight[1 + k, i] += reflection * (f32(F0) + f32(1 - F0) * s5[i]) * f
+                weight[1 + knots + k, i] = f
+            else:
+                weight[1 + k, i] = (f32(1) - s5[i]) * f
+                weight[1 + knots + k, i] = s5[i] * f
+    for i in range(count):
+        inverse[i] = f32(1) / density[i]
+    for j in range(len(weight)):
+        for i in range(count):
+            weight[j, i] *= inverse[i]
+
+
+@inline
+def _scales(table, n, wo, p, j, normaliser):  # type: ignore[no-untyped-def]
+    """Of sum j at point p: what makes both halves of the rays, the first and the second a mean each.
+
+    Divided by their own weights and multiplied by the open-point albedo; plain sums where the table has no rows.
+    """
+    f32 = np.float32
+    if len(table) == 0:
+        return f32(1), f32(2), f32(2)
+    wo_z = max(wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2], f32(MIN_COSINE * 0.5))
+    position = math.sqrt(min(wo_z, f32(1))) * f32(COSINE_STEPS - 1)
+    cell = min(int(position), COSINE_STEPS - 2)
+    x = position - f32(cell)
+    albedo = table[cell, j] * (f32(1) - x) + table[cell + 1, j] * x
+    first, second = normaliser[0, j], normaliser[1, j]
+    return (
+        albedo / (first + second) if first + second > 0 else f32(0),
+        albedo / first if first > 0 else f32(0),
+        albedo / second if second > 0 else f32(0),
+    )
+
+
+@fast
 def accumulate(  # type: ignore[no-untyped-def]
-    n, t, b, wo, alphas, rays, row, directions, occluded, table, seen, where, out, gap
+    n, t, b, wo, alphas, sampled, row, directions, occluded, table, seen, where, out, gap
 ):
     """Sum the rays of each point.
 
     Args:
-        n, t, b, wo: (P, 3) world. alphas: of the knots. rays: counts and bounds of `Rays`.
-        row, directions, occluded: of `draw` and the scene. table: open-point albedo.
+        n, t, b, wo: (P, 3) world. alphas: of the glossy lobes. sampled: counts and bounds of `Rays`, principled of `Terms`.
+        row, directions, occluded: of `draw` and the scene. table: open-point albedo; without rows, sums are
+        plain, see `_scales`, and the light is looked up as it is.
         seen: pyramid, level_start, fine, block of a `LightSet`; density of `Rays`; number of `Cells`; aimed of `aim`.
-        where: each point's row of `out` and `gap`, and the place of E, then A and B of every knot but the mirror's in it.
+        where: each point's row of `out` and `gap`, and the place of each sum in it.
         out: (..., CHANNELS), written. gap: as `out`, written: the estimate from the first half of the rays less that
         from the second.
     """
     f32 = np.float32
-    counts, bounds = rays
+    counts, bounds, principled = sampled
     texels, level_start, fine, block, light_density, cells, aimed = seen
     lights = len(cells)
     points, slots = row.shape
-    knots = len(alphas)
-    terms, levels = 2 * knots + 1, len(level_start)
+    terms, levels = table.shape[1], len(level_start)
     dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
     s5, sin2, cos2 = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
-    tan2, density, inverse = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
+    scratch = (s5, sin2, cos2, np.empty(slots, np.float32))
+    density, inverse = np.empty(slots, np.float32), np.empty(slots, np.float32)
     bits = inverse.view(np.int32)
     us, vs, level = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.int32)
     visible = np.empty(slots, np.bool_)
@@ -266,13 +359,8 @@ def accumulate(  # type: ignore[no-untyped-def]
     smooth, bright = np.zeros((2, terms, CHANNELS), np.float32), np.zeros((2, terms, CHANNELS), np.float32)
     normaliser = np.empty((2, terms), np.float32)
     texel_angle = 4 * math.pi / (SQUARE * SQUARE)
+    filtering = f32(0.25 / texel_angle) if len(table) > 0 else f32(0)
     for p in range(points):
-        ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
-        nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
-        tx, ty, tz = t[p, 0], t[p, 1], t[p, 2]
-        bx, by, bz = b[p, 0], b[p, 1], b[p, 2]
-        wo_z = max(ox * nx + oy * ny + oz * nz, f32(MIN_COSINE * 0.5))
-        tan2_o = (f32(1) - min(wo_z, f32(1)) ** 2) / (wo_z * wo_z)
         for half in range(2):
             m = lobes = 0
             for is_light in range(2):
@@ -283,40 +371,9 @@ def accumulate(  # type: ignore[no-untyped-def]
                         dx[m], dy[m], dz[m] = directions[r, 0], directions[r, 1], directions[r, 2]
                         visible[m] = not occluded[r]
                         m += 1
-            # how much of each term a ray stands for: BRDF over the density of all the rays that could have been it
             weight = weights[: terms * m].reshape((terms, m))
-            for i in range(m):
-                wi_z = max(dx[i] * nx + dy[i] * ny + dz[i] * nz, f32(1e-7))
-                hx, hy, hz = dx[i] + ox, dy[i] + oy, dz[i] + oz
-                norm = f32(1) / math.sqrt(hx * hx + hy * hy + hz * hz)
-                hx, hy, hz = hx * norm, hy * norm, hz * norm
-                c = max(f32(1) - (hx * dx[i] + hy * dy[i] + hz * dz[i]), f32(0))
-                mx = hx * tx + hy * ty + hz * tz
-                my = hx * bx + hy * by + hz * bz
-                mz = hx * nx + hy * ny + hz * nz
-                s5[i] = c * c * c * c * c
-                sin2[i], cos2[i] = mx * mx + my * my, mz * mz
-                tan2[i] = (f32(1) - wi_z * wi_z) / (wi_z * wi_z)
-                density[i] = f32(counts[0]) * wi_z * f32(1 / math.pi)
-                weight[0, i] = f32(0.96) * (f32(1) - s5[i]) * wi_z * f32(1 / math.pi)
-            for k in range(knots):
-                a2 = alphas[k] * alphas[k]
-                lambda_o = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) - f32(1))
-                scale = f32(0.25) * a2 / (f32(math.pi) * wo_z)
-                share = f32(counts[k + 1]) / (f32(1) + lambda_o)
-                masking = f32(0.5) + lambda_o
-                for i in range(m):
-                    q = sin2[i] + a2 * cos2[i]
-                    D = scale / (q * q)
-                    f = D / (masking + f32(0.5) * math.sqrt(f32(1) + a2 * tan2[i]))
-                    density[i] += share * D
-                    weight[1 + k, i] = (f32(1) - s5[i]) * f
-                    weight[1 + knots + k, i] = s5[i] * f
-            for i in range(m):
-                inverse[i] = f32(1) / density[i]
+            weigh(n, t, b, wo, p, (dx, dy, dz), m, alphas, counts, principled, scratch, density, inverse, weight)
             for j in range(terms):
-                for i in range(m):
-                    weight[j, i] *= inverse[i]
                 total = f32(0)
                 for i in range(lobes):
                     total += weight[j, i]
@@ -330,7 +387,7 @@ def accumulate(  # type: ignore[no-untyped-def]
                     u, v = f32(1) - v, f32(1) - u
                 us[i] = (u if dx[i] >= 0 else -u) * f32(0.5) + f32(0.5)
                 vs[i] = (v if dy[i] >= 0 else -v) * f32(0.5) + f32(0.5)
-                inverse[i] = inverse[i] * f32(0.25 / texel_angle)  # an eighth of 2 x, the nearest level: finer, for less bias
+                inverse[i] = inverse[i] * filtering  # an eighth of 2 x, the nearest level: finer, for less bias
                 level[i] = min(max(((bits[i] >> 23) - 127) >> 1, 0), levels - 1)
             smooth_light[:m] = 0
             bright_light[:m] = 0
@@ -371,15 +428,8 @@ def accumulate(  # type: ignore[no-untyped-def]
                 np.dot(weight, bright_light[:m], bright[half])
             else:
                 bright[half] = 0
-        position = math.sqrt(min(wo_z, f32(1))) * f32(COSINE_STEPS - 1)
-        cell = min(int(position), COSINE_STEPS - 2)
-        x = position - f32(cell)
         for j in range(terms):
-            albedo = table[cell, j] * (f32(1) - x) + table[cell + 1, j] * x
-            first, second = normaliser[0, j], normaliser[1, j]
-            scale = albedo / (first + second) if first + second > 0 else f32(0)
-            scale0 = albedo / first if first > 0 else f32(0)
-            scale1 = albedo / second if second > 0 else f32(0)
+            scale, scale0, scale1 = _scales(table, n, wo, p, j, normaliser)
             target, place = where[0][p], where[1][j]
             for c in range(CHANNELS):
                 out[target, place, c] = (smooth[0, j, c] + smooth[1, j, c]) * scale + bright[0, j, c] + bright[1, j, c]
@@ -388,3 +438,54 @@ def accumulate(  # type: ignore[no-untyped-def]
                     - smooth[1, j, c] * scale1
                     + f32(2) * (bright[0, j, c] - bright[1, j, c])
                 )
+
+
+@fast
+def accumulate_bounce(  # type: ignore[no-untyped-def]
+    n, t, b, wo, alphas, sampled, row, directions, hit, shown, table, where, out, gap
+):
+    """Add to the sums of each point what its lobe rays see of the surface itself.
+
+    Args:
+        As `accumulate`; the rays are lobe rays only. hit: (R,) number of the surface point that a ray hits, or -1.
+        shown: (H, sums, CHANNELS), what such a point sends back to it, for each sum.
+    """
+    counts, bounds, principled = sampled
+    points, slots = row.shape
+    terms = table.shape[1]
+    dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
+    s5, sin2, cos2 = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
+    scratch = (s5, sin2, cos2, np.empty(slots, np.float32))
+    density, inverse = np.empty(slots, np.float32), np.empty(slots, np.float32)
+    number = np.empty(slots, np.int32)
+    weights = np.empty(terms * slots, np.float32)
+    total = np.empty((2, terms, CHANNELS), np.float32)
+    normaliser = np.empty((2, terms), np.float32)
+    for p in range(points):
+        total[:] = 0
+        any_hit = False
+        for half in range(2):
+            m = 0
+            for s in range(bounds[2 * half], bounds[2 * half + 1]):
+                r = row[p, s]
+                if r >= 0:
+                    dx[m], dy[m], dz[m] = directions[r, 0], directions[r, 1], directions[r, 2]
+                    number[m] = hit[r]
+                    any_hit |= hit[r] >= 0
+                    m += 1
+            weight = weights[: terms * m].reshape((terms, m))
+            weigh(n, t, b, wo, p, (dx, dy, dz), m, alphas, counts, principled, scratch, density, inverse, weight)
+            for j in range(terms):
+                normaliser[half, j] = weight[j].sum()
+                for i in range(m):
+                    if number[i] >= 0:
+                        for c in range(CHANNELS):
+                            total[half, j, c] += weight[j, i] * shown[number[i], j, c]
+        if not any_hit:
+            continue
+        for j in range(terms):
+            scale, scale0, scale1 = _scales(table, n, wo, p, j, normaliser)
+            target, place = where[0][p], where[1][j]
+            for c in range(CHANNELS):
+                out[target, place, c] += (total[0, j, c] + total[1, j, c]) * scale
+                gap[target, place, c] += total[0, j, c] * scale0 - total[1, j, c] * scale1

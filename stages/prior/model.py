@@ -13,8 +13,8 @@ from stages.core import diffusion
 from stages.core.artifact import Field, Provenance, Schema, load_npz, save_npz, sha256_file
 from stages.core.errors import ArtifactError
 from stages.prior import profile
-from stages.prior.network import CONDITIONS, Denoiser
-from stages.prior.text import WEIGHTS_FOLDER, TextEmbedding, TextEncoder, Vocabulary
+from stages.prior.network import Denoiser
+from stages.prior.text import WEIGHTS_FOLDER, Reader, TextEmbedding, TextEncoder, Vocabulary
 
 WEIGHTS = Schema("dreammat.prior", 1, {"parameters": Field("f2", ("N",))}, extra=("layout", "training"))
 """All parameters in one row, in the order of `layout`: [name, shape] each. training: what they came from."""
@@ -24,11 +24,11 @@ VOCABULARY_FILE = WEIGHTS_FOLDER / "vocabulary.npz"
 
 
 class PriorNetwork(nn.Module):
-    """Denoiser and text encoder: everything that is trained."""
+    """Everything that is trained: the denoiser with its text encoder, and the reader, which knows materials by words alone."""
 
     def __init__(self, dims: int) -> None:
         super().__init__()
-        self.denoiser, self.text = Denoiser(), TextEncoder(dims)
+        self.denoiser, self.text, self.reader = Denoiser(), TextEncoder(dims), Reader(dims)
 
     def layout(self) -> list[list[Any]]:
         """Name and shape of each parameter, in order."""
@@ -54,7 +54,7 @@ class Prior:
     One call of a guidance, for a batch of exposed renders:
 
         k = prior.exposure(lights, mask)
-        conditions = prior.prepare(depth, normal, mask, k * lights)
+        conditions = prior.prepare(depth, normal, height, mask, k * lights)
         x0 = prior.profile_tone(k * radiance)
         eps, material = prior.denoise(x_t, t, conditions, prior.embed(["gold"]).expand(len(x_t)))
     """
@@ -76,14 +76,20 @@ class Prior:
         with torch.no_grad():
             return self.network.text(vectors.to(self.device), present.to(self.device))
 
-    def expected_material(self, prompts: list[str]) -> Tensor:
-        """(B, 5): sRGB albedo, roughness and metallic that the words call for, on average over what they fit."""
+    def expected_material(self, prompts: list[str], heights: Tensor) -> Tensor:
+        """What the words call for at K heights over the object's middle, on average over what they fit.
+
+        Returns:
+            (B, K, 5): sRGB albedo, roughness and metallic.
+        """
+        vectors, present = (t.to(self.device) for t in self.vocabulary.encode(prompts))
+        reader = self.network.reader
         with torch.no_grad():
-            return self.network.text.expected(self.embed(prompts))
+            return reader.expected(reader.read(vectors, present), heights.to(self.device).expand(len(prompts), -1))
 
     def no_conditions(self, count: int) -> Tensor:
-        """Conditions of which nothing is given, (B, 22, S, S)."""
-        return torch.full((count, CONDITIONS, self.size, self.size), profile.DROPPED, device=self.device)
+        """Conditions of which nothing is given, (B, 23, S, S)."""
+        return torch.full((count, profile.CHANNELS, self.size, self.size), profile.DROPPED, device=self.device)
 
     def drop(self, conditions: Tensor, geometry: bool, light: bool) -> Tensor:
         """The same conditions without their geometry, their light, or both: the paper's ablations."""
@@ -96,7 +102,7 @@ class Prior:
         """The noise in x_t, and the material that the model takes each pixel for.
 
         Args:
-            x_t: (B, 3, S, S). t: (B,) long, 0 ... 999. conditions: (B, 22, S, S), as `prepare` and `drop` return
+            x_t: (B, 3, S, S). t: (B,) long, 0 ... 999. conditions: (B, 23, S, S), as `prepare` and `drop` return
             them, or None. text: of B prompts.
         Returns:
             (B, 3, S, S) float32; sRGB albedo, roughness and metallic in (0, 1), (B, 5, S, S) float32. No gradient is kept.

@@ -14,11 +14,8 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from stages.core.color import srgb_decode
-from stages.prior.profile import LIGHT, profile_tone, untone
+from stages.prior.profile import CHANNELS, LIGHT, profile_tone, untone
 from stages.prior.text import TextEmbedding
-
-CONDITIONS = 22
-"""Inverse depth, normal (3), six light maps RGB (18)."""
 
 OUTPUTS = 3 + 5
 """What is missing in v (3); sRGB albedo (3), roughness and metallic as logits."""
@@ -37,7 +34,7 @@ class Denoiser(nn.Module):
         fine, middle, coarse = widths
         self.time = nn.Sequential(nn.Linear(64, embedding), nn.SiLU(), nn.Linear(embedding, embedding))
         self.text = nn.Linear(text, embedding)
-        self.enter = nn.Conv2d(4 * (3 + CONDITIONS), fine, 3, padding=1)
+        self.enter = nn.Conv2d(4 * (3 + CHANNELS), fine, 3, padding=1)
         self.down_fine = ResBlock(fine, embedding)
         self.to_middle = Downsample(fine, middle)
         self.down_middle = ResBlock(middle, embedding)
@@ -59,7 +56,7 @@ class Denoiser(nn.Module):
         """Predict v and material.
 
         Args:
-            x: (B, 3, S, S) noisy image. t: (B,) step. a: (B, 1, 1, 1) alpha_bar of it. conditions: (B, 22, S, S).
+            x: (B, 3, S, S) noisy image. t: (B,) step. a: (B, 1, 1, 1) alpha_bar of it. conditions: (B, 23, S, S).
             S a multiple of 8.
         Returns:
             v (B, 3, S, S); sRGB albedo, roughness and metallic in (0, 1), (B, 5, S, S); float32.

@@ -1,4 +1,4 @@
-"""What the prior sees: its tone curve, its exposure and its 22 condition channels. Training and guidance share them.
+"""What the prior sees: its tone curve, its exposure and its 23 condition channels. Training and guidance share them.
 
 Convention: images are S x S point samples on black; radiance is linear and exposed by `exposure` before the tone curve,
 images and light maps alike. Conditions lie in [0, 1] (bright light maps a little above); dropped ones are `DROPPED`.
@@ -25,9 +25,10 @@ TARGET = 0.6
 DROPPED = -1.0
 """Value of every pixel of a condition that is not given."""
 
-GEOMETRY = slice(0, 4)
+CHANNELS = 23
+GEOMETRY = [0, 1, 2, 3, 22]
 LIGHT = slice(4, 22)
-"""Channels of inverse depth and normal, and of the light maps."""
+"""Channels of inverse depth, normal and height, and of the light maps."""
 
 
 def tone(radiance: Tensor) -> Tensor:
@@ -58,19 +59,21 @@ def exposure(lights: Tensor, mask: Tensor) -> Tensor:
     return torch.where(mean > 1e-6, TARGET / mean.clamp(min=1e-6), torch.ones_like(mean))
 
 
-def prepare(depth: Tensor, normal: Tensor, mask: Tensor, lights: Tensor) -> Tensor:
+def prepare(depth: Tensor, normal: Tensor, height: Tensor, mask: Tensor, lights: Tensor) -> Tensor:
     """The condition channels.
 
     Args:
-        depth: (B, 1, S, S) planar. normal: (B, 3, S, S) view space, unit. mask: (B, 1, S, S), 0 or 1.
+        depth: (B, 1, S, S) planar. normal: (B, 3, S, S) view space, unit. height: (B, 1, S, S) over
+        the object's middle, in object sizes: where top and base are, also in a crop. mask: (B, 1, S, S), 0 or 1.
         lights: (B, 18, S, S) exposed linear radiance, maps in the order of `core.shading.LIGHT_MAPS`.
     Returns:
-        (B, 22, S, S): inverse depth in [0.3, 1] per image (METHOD.md), normal / 2 + 0.5, toned light maps.
+        (B, 23, S, S): inverse depth in [0.3, 1] per image (METHOD.md), normal / 2 + 0.5, toned light maps, height + 0.5.
     """
     inside = mask > 0.5
     background = torch.tensor([0.5, 0.5, 1.0], dtype=normal.dtype, device=normal.device)[:, None, None]
     direction = torch.where(inside, normal * 0.5 + 0.5, background)
-    return torch.cat([inverse_depth(depth, inside), direction, torch.where(inside, tone(lights), 0.0)], 1)
+    others = (torch.where(inside, values, 0.0) for values in (tone(lights), height + 0.5))
+    return torch.cat([inverse_depth(depth, inside), direction, *others], 1)
 
 
 def drop(conditions: Tensor, geometry: Tensor, light: Tensor) -> Tensor:

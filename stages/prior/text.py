@@ -146,34 +146,79 @@ class TextEmbedding:
         return TextEmbedding(*(torch.cat(parts) for parts in zip(*(e.parts() for e in embeddings), strict=True)))
 
 
+LAYOUTS = ("none", "edges", "top", "spots", "stripes", "patches", "crevices")
+"""Ways to lay a second coat over the first."""
+
+SHARES = torch.tensor([0.0, 0.06, 0.0, 0.21, 0.5, 0.38, 0.26])
+"""Of the surface that the second coat takes up, as the training's materials have it; what lies on top is known by height."""
+
+TOP = LAYOUTS.index("top")
+
+BORDER = 0.05
+"""Width of the border of what lies on top, object sizes; it is taken to be at the object's middle."""
+
+
 class TextEncoder(nn.Module):
-    """A transformer over word vectors; its first token stands for the whole prompt, and for the empty one.
+    """A transformer over word vectors; the tokens put before them, `roots`, stand for the whole prompt, the empty one too."""
 
-    `expected` turns that token into the material the words call for, on average: albedo (linear), roughness, metallic.
-    """
-
-    def __init__(self, dims: int = 64, width: int = 128, layers: int = 2, heads: int = 4) -> None:
+    def __init__(self, dims: int = 64, width: int = 128, layers: int = 2, heads: int = 4, roots: int = 1) -> None:
         super().__init__()
         self.project = nn.Linear(dims, width)
-        self.whole = nn.Parameter(torch.randn(1, 1, width) * 0.02)
-        self.position = nn.Parameter(torch.randn(1, MAX_WORDS + 1, width) * 0.02)
+        self.whole = nn.Parameter(torch.randn(1, roots, width) * 0.02)
+        self.position = nn.Parameter(torch.randn(1, roots + MAX_WORDS, width) * 0.02)
         self.blocks = nn.ModuleList(TextBlock(width, heads) for _ in range(layers))
         self.norm = nn.LayerNorm(width)
-        self.expect = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 5))
 
     def forward(self, vectors: Tensor, present: Tensor) -> TextEmbedding:
         """Args: as `Vocabulary.encode` returns them, on the module's device."""
         whole = self.whole.expand(len(vectors), -1, -1)
         x = torch.cat([whole, self.project(vectors * vectors.shape[-1] ** 0.5)], 1) + self.position
-        present = torch.cat([torch.ones_like(present[:, :1]), present], 1)  # (B, L)
+        present = torch.cat([torch.ones_like(present[:, : whole.shape[1]]), present], 1)  # (B, L)
         for block in self.blocks:
             x = block(x, present)
         x = self.norm(x)
         return TextEmbedding(x, present, x[:, 0])
 
-    def expected(self, embedding: TextEmbedding) -> Tensor:
-        """(B, 5) in (0, 1): albedo (3), roughness, metallic; the mean over the materials that the prompt fits."""
-        return torch.sigmoid(self.expect(embedding.pooled))
+
+@dataclass(frozen=True)
+class Reading:
+    """What B prompts call for, on average over all that they fit.
+
+    coats: (B, 2, 5) in (0, 1), the base's sRGB albedo (3), roughness and metallic, and those of what lies on it, if anything
+    does. layout: (B, LAYOUTS) logits.
+    """
+
+    coats: Tensor
+    layout: Tensor
+
+
+class Reader(TextEncoder):
+    """Reads a prompt as a base coat, a second one, and how that one lies on it: "oak base and gold top"."""
+
+    def __init__(self, dims: int = 64, width: int = 128) -> None:
+        super().__init__(dims, width, roots=3)
+        self.coat = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 5))
+        self.layout = nn.Linear(width, len(LAYOUTS))
+
+    def read(self, vectors: Tensor, present: Tensor) -> Reading:
+        """Args: as `Vocabulary.encode` returns them."""
+        roots = self(vectors, present).tokens[:, :3]
+        return Reading(torch.sigmoid(self.coat(roots[:, :2])), self.layout(roots[:, 2]))
+
+    def expected(self, reading: Reading, height: Tensor) -> Tensor:
+        """The mean material at heights over the object's middle: with a border where one lies on top, else alike everywhere.
+
+        Args:
+            height: (B, K), object sizes.
+        Returns:
+            (B, K, 5) in (0, 1): sRGB albedo (3), roughness, metallic.
+        """
+        chance = torch.softmax(reading.layout, 1)
+        everywhere = chance @ SHARES.to(chance)
+        above = (height / BORDER + 0.5).clamp(0, 1)
+        share = everywhere[:, None] + chance[:, TOP, None] * above
+        base, second = reading.coats[:, None].unbind(2)
+        return base + (second - base) * share[..., None]
 
 
 class TextBlock(nn.Module):

@@ -185,7 +185,7 @@ def ablations(subject: Subject, seed: int, step: Callable[[int], None]) -> list[
         maps = [light_maps(t[torch.from_numpy(subject.pixels)]) for t in found]
         rows += compare(subject, name, quality, maps, time.perf_counter() - start, slice(None))
         step(1 + len(rows) // (6 * len(subject.truth)))
-    stored = [light_maps(Transport.unpack(rounded(t.packed()).float())) for t in subject.converged]
+    stored = [light_maps(Transport.unpack(rounded(t.packed(), plain=1).float())) for t in subject.converged]
     rows += compare(subject, "as stored", Quality(0, 0), stored, 0.0, slice(None))
     return rows + knots_left_out(subject) + quadrature(subject)
 

@@ -36,6 +36,26 @@ class PriorReportOptions:
 
 
 @dataclass(frozen=True)
+class DistillReportOptions:
+    """Options of the report on a step with Stable Diffusion."""
+
+    sd_model: str = ""
+    """as for `distill`; empty for networks of full size with random weights"""
+    controlnet: str = ""
+    """as for `distill`"""
+    vram: int | None = None
+    """as for `distill`"""
+    batch: int = 1
+    """views a step"""
+    warm_up: int = 2
+    """steps before those that are measured"""
+    steps: int = 5
+    """that are measured part by part, and as many again as a whole"""
+    device: str = "cpu"
+    """a torch device"""
+
+
+@dataclass(frozen=True)
 class EvalOptions:
     """Options of `dreammat eval`. Models are local; the paper's Table 2 has 50 assets, 120 views and samples of each."""
 

@@ -290,7 +290,7 @@ def relight(baked: Baked, points: GBuffer, maps: NDArray[np.float32], wanted: ND
     ideal = torch.tensor([*srgb_decode(wanted[:3]).tolist(), *wanted[3:].tolist()]).float().expand(len(maps), 5)
     squares = []
     for transport in light_transport(baked.scene, points, new_lights(), RAYS, 0):
-        a, b = (reinhard(shade(_float(transport), _material(values))) for values in (found, ideal))
+        a, b = (reinhard(shade(_float(transport), Material.of(values))) for values in (found, ideal))
         squares.append(float((a - b).square().mean()))
     return float(np.sqrt(np.mean(squares))) * 100
 
@@ -305,10 +305,6 @@ def new_lights() -> list[Environment]:
 
 def _float(transport: Transport) -> Transport:
     return transport.to(torch.float32)
-
-
-def _material(values: torch.Tensor) -> Material:
-    return Material(values[:, :3].contiguous(), values[:, 3].contiguous(), values[:, 4].contiguous())
 
 
 def summarise(rows: list[Row]) -> Iterable[Summary]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.train.substances import COLORS, FINISHES, FINISHES_METAL, SUBSTANCES
+from stages.train.colors import COLORS, rgb
+from stages.train.substances import FINISHES, FINISHES_METAL, SUBSTANCES
 
 
 @dataclass(frozen=True)
@@ -41,18 +42,14 @@ def taught(name: str, color: str = "", finish: str = "") -> Meaning:
     of = substances[0]
     anchors = [COLORS[color]] if color else of.colors
     low, high = (FINISHES_METAL if of.metallic else FINISHES)[finish] if finish else of.roughness
-    red, green, blue = np.mean([_rgb(text) for text in anchors], 0).tolist()
+    red, green, blue = np.mean([rgb(text) for text in anchors], 0).tolist()
     return Meaning((red, green, blue), (low + high) / 2, of.metallic)
 
 
 def known(color: str, roughness: float, metallic: float = 0.0) -> Meaning:
     """A material from its sRGB hex colour."""
-    red, green, blue = _rgb(color)
+    red, green, blue = rgb(color).tolist()
     return Meaning((red, green, blue), roughness, metallic)
-
-
-def _rgb(text: str) -> list[float]:
-    return [int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)]
 
 
 def _seen(text: str, name: str, color: str = "", finish: str = "") -> Prompt:

@@ -79,19 +79,14 @@ def measure(scene: Scene, points: GBuffer, lights: LightSet, seed: int) -> list[
 
 def from_transport(transport: Transport, values: Tensor) -> Tensor:
     """Radiance (P, 3) of materials (P, 5)."""
-    return shade(transport, as_material(values))
+    return shade(transport, Material.of(values))
 
 
 def from_rays(
     scene: Scene, light: Environment, generator: np.random.Generator, points: GBuffer, values: Tensor
 ) -> Tensor:
     """Radiance (P, 3) of materials (P, 5)."""
-    return shade_monte_carlo(scene, points, light, as_material(values), generator)
-
-
-def as_material(values: Tensor) -> Material:
-    """Columns albedo, roughness, metallic."""
-    return Material(values[:, :3], values[:, 3], values[:, 4])
+    return shade_monte_carlo(scene, points, light, Material.of(values), generator)
 
 
 def timed_gradient(shading: Callable[[Tensor], Tensor], materials: Tensor, repeats: int) -> tuple[Tensor, float]:

@@ -100,10 +100,15 @@ def find_models(options: SdOptions) -> ModelFiles:
     return files
 
 
-def find_base(source: str) -> tuple[Path, tuple[Network, Network, Network]]:
-    """The base's folder, and in it unet, vae and text encoder. Raises: InputError when packages or files are missing."""
+def need_packages() -> None:
+    """Raises: InputError when the packages of the extra `sd` are not installed."""
     if missing := [name for name in PACKAGES if importlib.util.find_spec(name) is None]:
         raise InputError(f'Stable Diffusion: needs {", ".join(missing)}, not installed here; pip install ".[sd]"')
+
+
+def find_base(source: str) -> tuple[Path, tuple[Network, Network, Network]]:
+    """The base's folder, and in it unet, vae and text encoder. Raises: InputError when packages or files are missing."""
+    need_packages()
     parts = ("unet", "vae", "text_encoder")
     base = _folder("--sd-model", source, parts)
     unet, vae, text_encoder = (_network(base / name) for name in parts)

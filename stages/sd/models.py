@@ -154,7 +154,12 @@ def load_models(files: ModelFiles, device: torch.device, plan: Plan) -> StableDi
 
     be_quiet()
     unet, controlnet = load_network(UNet2DConditionModel, files.unet), load_network(ControlNetModel, files.controlnet)
-    vae = load_network(AutoencoderKL, files.vae)
+    parts = place(unet, controlnet, load_network(AutoencoderKL, files.vae), device, plan)
+    return StableDiffusion(files, *parts, _alpha_bar(files, device), files.hashes(), device, plan)
+
+
+def place(unet: Any, controlnet: Any, vae: Any, device: torch.device, plan: Plan) -> tuple[Denoiser, Any]:
+    """Networks for inference on a device, as the module says: denoiser, and VAE without its decoder."""
     del vae.decoder
     if device.type == "cuda":
         unet, controlnet = unet.half(), controlnet.half()
@@ -170,7 +175,7 @@ def load_models(files: ModelFiles, device: torch.device, plan: Plan) -> StableDi
     else:
         denoiser.to(device)
         _compile(denoiser, device)
-    return StableDiffusion(files, denoiser, vae.to(device), _alpha_bar(files, device), files.hashes(), device, plan)
+    return denoiser, vae.to(device)
 
 
 def load_for_training(files: ModelFiles, device: torch.device, dtype: torch.dtype) -> StableDiffusion:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core.artifact import load_npz
-from stages.core.color import srgb_encode
 from stages.core.shading import KNOTS, Material, Transport, light_maps, shade
 from stages.prior.profile import SIZE, exposure, prepare, profile_tone
-from stages.train.materials import Surface, mean_parameters, random_material
+from stages.prior.text import LAYOUTS
+from stages.train.materials import Surface, encoded, random_material, stand_in
 from stages.train.render import SHARD
 
 
@@ -24,8 +24,8 @@ from stages.train.render import SHARD
 class Batch:
     """B pictures and what they show.
 
-    image: (B, 3, S, S) as the model sees it. conditions: (B, 22, S, S). mask: (B, 1, S, S), 0 or 1.
-    material: (B, 5, S, S) sRGB albedo, roughness, metallic. captions: B texts. mean: (B, 5) of the material.
+    image: (B, 3, S, S) as the model sees it. conditions: (B, 23, S, S). mask: (B, 1, S, S), 0 or 1.
+    material: (B, 5, S, S) sRGB albedo, roughness, metallic. captions: B texts.
     """
 
     image: Tensor
@@ -33,7 +33,6 @@ class Batch:
     mask: Tensor
     material: Tensor
     captions: list[str]
-    mean: Tensor
 
 
 @dataclass(frozen=True)
@@ -76,48 +75,75 @@ class PictureBatches(torch.utils.data.Dataset):
     def __getitem__(self, step: int) -> Batch:
         rng = default_rng([self.seed, 1, step])
         pictures = [picture(self.tiles[int(rng.integers(len(self.tiles)))], rng) for _ in range(self.size)]
-        captions, means, images = zip(*pictures, strict=True)
-        return assemble(list(captions), torch.stack(means), torch.from_numpy(np.stack(images)), rng)
+        captions, images = zip(*pictures, strict=True)
+        return assemble(list(captions), torch.from_numpy(np.stack(images)), rng)
+
+
+POINTS = 12
+"""Points of a material that stand for it where the reader learns."""
+
+
+COMPOSED = 0.7
+"""Share of compositions there: what goes where is harder to learn than what it is."""
+
+
+@dataclass(frozen=True)
+class CaptionBatch:
+    """B captions and what they call for.
+
+    coats: (B, 2, 5), mean material of each coat, 0 where there is no second one. layout: (B,), its number in `LAYOUTS`.
+    """
+
+    captions: list[str]
+    coats: Tensor
+    layout: Tensor
 
 
 class CaptionBatches(torch.utils.data.Dataset):
-    """Captions and the mean materials (B, 5) they go with; batch number `step` of a run."""
+    """Captions and what they call for; batch number `step` of a run."""
 
     def __init__(self, size: int, seed: int) -> None:
         self.size, self.seed = size, seed
 
-    def __getitem__(self, step: int) -> tuple[list[str], Tensor]:
+    def __getitem__(self, step: int) -> CaptionBatch:
         rng = default_rng([self.seed, 2, step])
-        materials = [random_material(rng) for _ in range(self.size)]
-        means = np.stack([mean_parameters(material, rng, 48) for material in materials])
-        return [material.caption for material in materials], torch.from_numpy(means)
+        coats, layout = np.zeros((self.size, 2, 5), np.float32), np.zeros(self.size, np.int64)
+        captions = []
+        for i in range(self.size):
+            material, surface = random_material(rng, COMPOSED), stand_in(rng, POINTS)
+            captions.append(material.caption)
+            for k, coat in enumerate(material.coats):
+                coats[i, k] = encoded(coat.evaluate(surface)).mean(0)
+            if material.layout is not None:
+                layout[i] = LAYOUTS.index(material.layout.kind)
+        return CaptionBatch(captions, *map(torch.from_numpy, (coats, layout)))
 
 
-CHANNELS = {"mask": 1, "depth": 1, "normal": 3, "lights": 18, "radiance": 3, "material": 5}
+CHANNELS = {"mask": 1, "depth": 1, "normal": 3, "height": 1, "lights": 18, "radiance": 3, "material": 5}
 """Channels of a picture as `picture` lays them out."""
 
 
-def picture(tile: Tile, rng: Generator) -> tuple[str, Tensor, NDArray[np.float32]]:
+def picture(tile: Tile, rng: Generator) -> tuple[str, NDArray[np.float32]]:
     """One tile under a random light with a random material.
 
     Returns:
-        caption, mean material (5,), channels (31, S, S) as `CHANNELS`, zero off the object.
+        caption, channels (32, S, S) as `CHANNELS`, zero off the object.
     """
     transport = random_transport(tile.transport, tile.cosine, rng)
     material = random_material(rng)
     values = material.evaluate(tile.surface)  # (P, 5)
     parameters = torch.from_numpy(values)
-    radiance = shade(transport, Material(parameters[:, :3], parameters[:, 3], parameters[:, 4]))
-    encoded = np.concatenate([srgb_encode(values[:, :3]), values[:, 3:]], 1)  # (P, 5)
+    radiance = shade(transport, Material.of(parameters))
     lights = light_maps(transport).reshape(len(values), 18).numpy()
-    ones = np.ones((len(values), 1), np.float32)
-    flat = np.concatenate([ones, tile.depth[tile.mask][:, None], tile.normal, lights, radiance.numpy(), encoded], 1)
+    depth, height = tile.depth[tile.mask][:, None], tile.surface.point[:, 2:]
+    parts = (np.ones_like(height), depth, tile.normal, height, lights, radiance.numpy(), encoded(values))
+    flat = np.concatenate(parts, 1).astype(np.float32)
     dense = np.zeros((flat.shape[1], SIZE, SIZE), np.float32)
     dense[:, tile.mask] = flat.T
     if rng.random() < 0.5:  # a mirrored world is as good
         dense = dense[..., ::-1].copy()
         dense[2] *= -1
-    return material.caption, torch.from_numpy(encoded.mean(0)), dense
+    return material.caption, dense
 
 
 def random_transport(stored: NDArray[np.float16], cosine: NDArray[np.float32], rng: Generator) -> Transport:
@@ -134,10 +160,10 @@ def random_gain(rng: Generator) -> NDArray[np.float32]:
     return np.exp(rng.normal(0, 0.6) + rng.normal(0, 0.12, 3)).astype(np.float32)
 
 
-def assemble(captions: list[str], means: Tensor, dense: Tensor, rng: Generator) -> Batch:
-    """Pictures as the model wants them. Args: dense (B, 31, S, S) as `CHANNELS`."""
-    mask, depth, normal, lights, radiance, material = dense.split(list(CHANNELS.values()), 1)
+def assemble(captions: list[str], dense: Tensor, rng: Generator) -> Batch:
+    """Pictures as the model wants them. Args: dense (B, 32, S, S) as `CHANNELS`."""
+    mask, depth, normal, height, lights, radiance, material = dense.split(list(CHANNELS.values()), 1)
     jitter = torch.from_numpy(np.exp(rng.normal(0, 0.25, (len(captions), 1, 1, 1))).astype(np.float32))
     exposed = exposure(lights, mask) * jitter
-    conditions = prepare(depth, normal, mask, lights * exposed)
-    return Batch(profile_tone(radiance * exposed), conditions, mask, material, captions, means)
+    conditions = prepare(depth, normal, height, mask, lights * exposed)
+    return Batch(profile_tone(radiance * exposed), conditions, mask, material, captions)

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 
 from stages.core.color import srgb_decode, srgb_encode
 from stages.train.captions import Words, caption, pick, pick_weighted
+from stages.train.colors import COLORS, COMMON, draw_named, rgb
 from stages.train.patterns import PATTERNS, fbm, noise, placement
-from stages.train.substances import COLORS, FINISHES, FINISHES_METAL, METALS, SUBSTANCES, Substance
+from stages.train.substances import FINISHES, FINISHES_METAL, METALS, SUBSTANCES, Substance
 
 SHARES = np.cumsum([s.weight for s in SUBSTANCES])[:-1] / sum(s.weight for s in SUBSTANCES)
 """Upper end of each substance's share of [0, 1), but the last's."""
 
 LEVEL_PATTERNS = ("bricks", "strata")
-COLOR_WORDS = tuple(COLORS)
 SHARED_FINISH = 0.45
 """Share of coats that a finish word describes."""
 
@@ -94,11 +94,11 @@ class RandomMaterial:
         return base + (self.coats[1].evaluate(surface) - base) * cover
 
 
-KINDS = (("edges", 0.2), ("top", 0.22), ("spots", 0.14), ("stripes", 0.14), ("patches", 0.12), ("crevices", 0.18))
+KINDS = (("edges", 0.18), ("top", 0.32), ("spots", 0.13), ("stripes", 0.13), ("patches", 0.1), ("crevices", 0.14))
 """Ways to lay a second coat, with their shares."""
 
 
-def random_material(rng: Generator, composed: float = 0.25) -> RandomMaterial:
+def random_material(rng: Generator, composed: float = 0.4) -> RandomMaterial:
     """Draw a material. composed: share of materials with two coats."""
     base = draw_coat(rng, draw_substance(rng))
     if rng.random() >= composed:
@@ -159,12 +159,12 @@ WORN = (
 def draw_color(rng: Generator, substance: Substance) -> tuple[NDArray, str]:
     """sRGB (3,) and the word for it, empty when it goes without saying."""
     if substance.paintable and rng.random() < 0.8:
-        word = pick(rng, COLOR_WORDS)
-        return vary(rng, hex_color(COLORS[word]), 0.035), word
+        word, color = draw_named(rng)
+        return vary(rng, color, 0.035), word
     first, second = pick(rng, substance.colors), pick(rng, substance.colors)
     if substance.paintable:
-        return vary(rng, hex_color(first), 0.03), nearest_color(first)
-    mixed = hex_color(first) + (hex_color(second) - hex_color(first)) * rng.random()
+        return vary(rng, rgb(first), 0.03), nearest_color(first)
+    mixed = rgb(first) + (rgb(second) - rgb(first)) * rng.random()
     return vary(rng, mixed, 0.01 if substance.metallic else 0.025), ""
 
 
@@ -184,15 +184,9 @@ def vary(rng: Generator, color: NDArray, amount: float) -> NDArray:
 
 
 @functools.lru_cache(maxsize=1024)
-def hex_color(text: str) -> NDArray:
-    """(3,) in [0, 1] of "#rrggbb"."""
-    return np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
-
-
-@functools.lru_cache(maxsize=1024)
 def nearest_color(text: str) -> str:
-    """The colour name whose sRGB is nearest to that of "#rrggbb"."""
-    return min(COLORS, key=lambda word: float(((hex_color(COLORS[word]) - hex_color(text)) ** 2).sum()))
+    """The common colour name whose sRGB is nearest to that of "#rrggbb"."""
+    return min(COMMON, key=lambda word: float(((rgb(COLORS[word]) - rgb(text)) ** 2).sum()))
 
 
 def coverage(layout: Layout, surface: Surface) -> NDArray[np.float32]:
@@ -220,15 +214,18 @@ def ramp(x: NDArray, edge: float, width: float) -> NDArray:
     return np.clip((x - edge) / (2 * width) + 0.5, 0, 1).astype(np.float32)
 
 
-def mean_parameters(material: RandomMaterial, rng: Generator, count: int = 96) -> NDArray[np.float32]:
-    """(5,) mean sRGB albedo, roughness, metallic over points of a stand-in surface; what the text encoder learns."""
+def stand_in(rng: Generator, count: int) -> Surface:
+    """Points of a surface that is mostly flat and open, on which the reader of prompts learns."""
     normal = rng.normal(size=(count, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    surface = Surface(
+    return Surface(
         rng.uniform(-0.5, 0.5, (count, 3)).astype(np.float32),
         normal.astype(np.float32),
-        rng.uniform(-0.5, 0.8, count).astype(np.float32),
-        rng.uniform(0, 0.6, count).astype(np.float32),
+        rng.normal(0, 0.18, count).clip(-1, 1).astype(np.float32),
+        np.abs(rng.normal(0, 0.25, count)).clip(0, 1).astype(np.float32),
     )
-    values = material.evaluate(surface)
-    return np.concatenate([srgb_encode(values[:, :3]), values[:, 3:]], 1).mean(0)
+
+
+def encoded(values: NDArray) -> NDArray[np.float32]:
+    """Materials (P, 5) with their albedo as sRGB, the way the model sees them."""
+    return np.concatenate([srgb_encode(values[:, :3]), values[:, 3:]], 1).astype(np.float32)

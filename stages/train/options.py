@@ -8,12 +8,13 @@ from pathlib import Path
 class TrainPriorOptions:
     """What the embedded prior is trained with."""
 
-    steps: int = 4000  # optimiser steps, the text encoder's own first ones included
-    text_steps: int = 500  # first steps, that train the text encoder alone on captions and mean materials
+    steps: int = 9000  # optimiser steps, the reader's first ones included
+    text_steps: int = 3000  # first steps, that train the reader alone, on captions and the materials they call for
     batch: int = 32  # pictures a step
     learning_rate: float = 6e-4  # of Adam, after warming up
     shards: int = 40  # files of light transport
     tiles: int = 40  # pictures in each shard
+    start: Path | None = None  # weights to begin with, as far as they fit; None: random ones
     seed: int = 0
     device: str = "cpu"  # a torch device
     workers: int = 0  # processes that make batches; 0: the training process itself

@@ -178,7 +178,7 @@ def render_view(
     values, found = thing.model.material_at(view.point, np.broadcast_to(c2w[:3, 3], view.point.shape))
     if (missed := 1 - found.mean()) > MAX_MISSED:
         raise InputError(f"{thing.model.path}: {missed:.0%} of a view have no material that can be read")
-    material = Material(*(t.contiguous().squeeze(1) for t in torch.from_numpy(values).split([3, 1, 1], 1)))
+    material = Material.of(torch.from_numpy(values))
     transports = light_transport(thing.scene, view, lights, QUALITY[options.quality], seed)
     mask = torch.from_numpy(view.mask)
     depth, normal = torch.from_numpy(view.depth)[None], torch.from_numpy(view_normals(view, c2w)).movedim(-1, 0)

@@ -7,6 +7,7 @@
     out/samples_NNNNNN.png     pictures sampled under held-out tiles
 """
 
+import math
 import subprocess
 import time
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import cross_entropy
 
 from stages.core import diffusion
 from stages.core.artifact import (
@@ -34,8 +36,8 @@ from stages.core.errors import NumericalError
 from stages.core.progress import Progress, silent
 from stages.prior.model import VOCABULARY_FILE, WEIGHTS, PriorNetwork, save_weights
 from stages.prior.profile import drop
-from stages.prior.text import TextEmbedding, Vocabulary
-from stages.train.batches import Batch, CaptionBatches, PictureBatches, Tiles
+from stages.prior.text import Vocabulary
+from stages.train.batches import Batch, CaptionBatch, CaptionBatches, PictureBatches, Tiles
 from stages.train.options import TrainPriorOptions
 from stages.train.render import render_shards
 from stages.train.samples import write_samples
@@ -56,13 +58,15 @@ CHECKPOINT = Schema(
 )
 
 MATERIAL_WEIGHT = 0.3
-TEXT_WEIGHT = 0.2
 BACKGROUND_WEIGHT = 0.1
 NULL_TEXT, NO_GEOMETRY, NO_LIGHT = 0.12, 0.15, 0.15
 """Shares of pictures that are learnt without their text, geometry or light maps."""
 
-WORD_NOISE = 0.04
+WORD_NOISE = 0.06
 """Deviation of the noise on each component of a (unit) word vector, so that neighbours of a word are learnt with it."""
+
+LAYOUT_WEIGHT = 0.02
+"""Of the layout's cross entropy beside the coats' squared errors."""
 
 FREE = ("device", "workers", "checkpoint_every", "sample_every")
 CAPTIONS = 256
@@ -123,7 +127,10 @@ def train_prior(
     Raises: NumericalError when a loss is not finite; OutputError.
     """
     weights = out / "prior.npz"
-    request = Provenance(learnt_from(options), options.seed, {"vocabulary": sha256_file(VOCABULARY_FILE)})
+    inputs = {"vocabulary": sha256_file(VOCABULARY_FILE)}
+    if options.start is not None:
+        inputs["start"] = sha256_file(options.start)
+    request = Provenance(learnt_from(options), options.seed, inputs)
     done = None if force else peek(weights, WEIGHTS)
     if done is not None and done.same_request(request) and done.extra["training"]["step"] == options.steps:
         return TrainPriorResult(weights, options.steps, up_to_date=True)
@@ -131,7 +138,10 @@ def train_prior(
     vocabulary = Vocabulary.load(VOCABULARY_FILE)
     with torch.random.fork_rng():  # nn.Module initialisation knows only the global generator, which is put back
         torch.default_generator.manual_seed(options.seed)
-        state = State(PriorNetwork(vocabulary.vectors.shape[1]), torch.device(options.device))
+        network = PriorNetwork(vocabulary.vectors.shape[1])
+    if options.start is not None:
+        begin_with(network, options.start)
+    state = State(network, torch.device(options.device))
     if not force:
         restore(state, out / "checkpoint.npz", request)
     for losses in optimise(state, tiles, vocabulary, options):
@@ -145,25 +155,42 @@ def train_prior(
 
 def learnt_from(options: TrainPriorOptions) -> dict[str, Any]:
     """The options that shape the result; a resumed run may change the others."""
-    return {name: value for name, value in plain_options(options).items() if name not in FREE}
+    chosen = {name: value for name, value in plain_options(options).items() if name not in FREE}
+    return chosen | {"start": options.start.name if options.start else None}
+
+
+def begin_with(network: PriorNetwork, path: Path) -> None:
+    """Take what an earlier training learnt; where a parameter has grown since, the rest is 0. Raises: ArtifactError."""
+    stored = load_npz(path, WEIGHTS)
+    parameters, start = dict(network.named_parameters()), 0
+    for name, shape in stored.provenance.extra["layout"]:
+        values = torch.from_numpy(stored["parameters"][start : start + math.prod(shape)].astype(np.float32)).view(shape)
+        start += values.numel()
+        if name in parameters and _fits(shape, parameters[name].shape):
+            parameters[name].data.zero_()[tuple(map(slice, shape))] = values
+
+
+def _fits(shape: list[int], into: torch.Size) -> bool:
+    return len(shape) == len(into) and all(old <= new for old, new in zip(shape, into, strict=True))
 
 
 def optimise(
     state: State, tiles: Tiles, vocabulary: Vocabulary, options: TrainPriorOptions
 ) -> Iterator[tuple[float, float, float]]:
     """Yield the losses (noise, material, text) of each step up to the last, after the step is done."""
-    alpha_bar = diffusion.cosine_schedule().to(options.device)
+    alpha_bar, zero = diffusion.cosine_schedule().to(options.device), torch.zeros((), device=options.device)
     pictures = loader(PictureBatches(tiles, options.batch, options.seed), state.step, options.text_steps, options)
     captions = loader(CaptionBatches(CAPTIONS, options.seed), state.step, 0, options)
     while state.step < options.steps:
         start = time.perf_counter()
         generator = torch.Generator().manual_seed(options.seed * 1_000_003 + state.step)
         if state.step < options.text_steps:
-            losses = text_losses(state.network, vocabulary, next(captions), generator)
+            noise, material = zero, zero
+            text = reader_loss(state.network, vocabulary, next(captions), generator)
         else:
-            losses = picture_losses(state.network, vocabulary, next(pictures), alpha_bar, generator)
-        noise, material, text = losses
-        (noise + MATERIAL_WEIGHT * material + TEXT_WEIGHT * text).backward()
+            noise, material = picture_losses(state.network, vocabulary, next(pictures), alpha_bar, generator)
+            text = zero
+        (noise + MATERIAL_WEIGHT * material + text).backward()
         state.update(learning_rate(state.step, options))
         values = (float(noise.detach()), float(material.detach()), float(text.detach()))
         state.seconds += time.perf_counter() - start
@@ -189,8 +216,8 @@ def learning_rate(step: int, options: TrainPriorOptions) -> float:
 
 def picture_losses(
     network: PriorNetwork, vocabulary: Vocabulary, batch: Batch, alpha_bar: Tensor, generator: torch.Generator
-) -> tuple[Tensor, Tensor, Tensor]:
-    """Errors of v, of the material of each pixel, and of the text's expected material."""
+) -> tuple[Tensor, Tensor]:
+    """Errors of v and of the material of each pixel."""
     device, count = alpha_bar.device, len(batch.image)
     t = torch.randint(0, diffusion.STEPS, (count,), generator=generator).to(device)
     noise = torch.randn(batch.image.shape, generator=generator).to(device)
@@ -199,35 +226,35 @@ def picture_losses(
     conditions = drop(batch.conditions.to(device), (lost[1] < NO_GEOMETRY).to(device), (lost[2] < NO_LIGHT).to(device))
     described = (lost[0] >= NULL_TEXT).tolist()
     prompts = [caption if keep else "" for caption, keep in zip(batch.captions, described, strict=True)]
-    text = embed(network, vocabulary, prompts, generator, device)
+    text = network.text(*noisy_words(vocabulary, prompts, generator, device))
     x_t = diffusion.add_noise(alpha_bar, image, noise, t)
     with torch.autocast(device.type, torch.bfloat16):
         v, surface = network.denoiser(x_t, t, diffusion.per_image(alpha_bar, t), conditions, text)
     weight = mask + BACKGROUND_WEIGHT * (1 - mask)
     error = (v - diffusion.velocity(alpha_bar, image, noise, t)).square().mean(1, keepdim=True)
     material_error = (surface - material).square().mean(1, keepdim=True)
-    text_error = (network.text.expected(text) - batch.mean.to(device)).square().mean()
-    return (error * weight).sum() / weight.sum(), (material_error * mask).sum() / mask.sum().clamp(min=1), text_error
+    return (error * weight).sum() / weight.sum(), (material_error * mask).sum() / mask.sum().clamp(min=1)
 
 
-def text_losses(
-    network: PriorNetwork, vocabulary: Vocabulary, batch: tuple[list[str], Tensor], generator: torch.Generator
-) -> tuple[Tensor, Tensor, Tensor]:
-    """As `picture_losses`, of captions and their mean materials alone; the first two are 0."""
-    captions, means = batch
+def reader_loss(
+    network: PriorNetwork, vocabulary: Vocabulary, batch: CaptionBatch, generator: torch.Generator
+) -> Tensor:
+    """Error of the coats that captions call for, and of their layout."""
     device = next(network.parameters()).device
-    text = embed(network, vocabulary, captions, generator, device)
-    zero = torch.zeros((), device=device)
-    return zero, zero, (network.text.expected(text) - means.to(device)).square().mean()
+    coats, layout = batch.coats.to(device), batch.layout.to(device)
+    reading = network.reader.read(*noisy_words(vocabulary, batch.captions, generator, device))
+    there = torch.stack([torch.ones_like(layout), (layout > 0).long()], 1)[..., None]  # (B, 2, 1)
+    wrong_coats = (there * (reading.coats - coats).square()).mean()
+    return wrong_coats + LAYOUT_WEIGHT * cross_entropy(reading.layout, layout)
 
 
-def embed(
-    network: PriorNetwork, vocabulary: Vocabulary, prompts: list[str], generator: torch.Generator, device: torch.device
-) -> TextEmbedding:
-    """Text embeddings of prompts whose word vectors are a little off."""
+def noisy_words(
+    vocabulary: Vocabulary, prompts: list[str], generator: torch.Generator, device: torch.device
+) -> tuple[Tensor, Tensor]:
+    """Word vectors of prompts, a little off; as `Vocabulary.encode`."""
     vectors, present = vocabulary.encode(prompts)
     vectors = vectors + WORD_NOISE * torch.randn(vectors.shape, generator=generator) * present[..., None]
-    return network.text(vectors.to(device), present.to(device))
+    return vectors.to(device), present.to(device)
 
 
 def save(state: State, out: Path, request: Provenance) -> None:

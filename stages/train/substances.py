@@ -54,6 +54,15 @@ METALS = (
     _metal("zinc, galvanized metal, galvanized steel", "#d0d3d6, #bcc2c8", (0.3, 0.55), 1),
     _metal("gunmetal, dark metal, black metal, blackened steel", "#6e7176, #5d6066, #55585c", (0.2, 0.5), 1.2),
     _metal("metal, shiny metal, metallic", "#c8c8c8, #d4d2cf, #b4b6b8", (0.08, 0.4), 1.5),
+    _metal("gold leaf, gold foil, gold plated metal, gold plating", "#ffe29b, #ffe49e", (0.15, 0.4), 1),
+    _metal("white gold", "#ece6da, #e4dfd4", (0.05, 0.3), 0.6),
+    _metal("aluminium foil, tin foil, metal foil", "#eceef0, #e4e6e8", (0.08, 0.3), 0.7),
+    _metal("mercury, quicksilver, liquid metal", "#dcdcde, #d4d4d6", (0, 0.08), 0.6),
+    _metal("tungsten, cobalt metal", "#b4b2b4, #a8a6a6", (0.2, 0.5), 0.6),
+    _metal("antique brass, aged brass, old brass", "#b8975a, #a88648", (0.3, 0.55), 0.7),
+    _metal("antique bronze, dark bronze, aged bronze", "#86623e, #745232", (0.3, 0.55), 0.7),
+    _metal("magnesium, cadmium", "#dadada, #d0d0ce", (0.25, 0.5), 0.4),
+    _metal("pyrite", "#d2bc82, #c6ae70", (0.15, 0.4), 0.4),
     Substance(("anodized aluminum", "anodized metal", "colored metal"), "metal", ("#c05050", "#5070c0", "#50b080",
               "#b060c0", "#d09040"), (0.2, 0.4), "smudge", 0.1, 1.0, paintable=True, weight=1.0),
 )
@@ -63,6 +72,10 @@ CORRODED = (
               "rust", ("#7a3b1d", "#8e4a25", "#5f2f1b", "#a35a2c"), (0.75, 0.97), "blotch", 0.6, weight=3.5),
     Substance(("verdigris", "oxidized copper", "copper patina"), "rust", ("#5fa08c", "#7ab8a4", "#4c8a78"),
               (0.65, 0.9), "blotch", 0.5, weight=1.2),
+    Substance(("oxidized iron", "iron oxide", "flaking rust", "decayed metal"), "rust",
+              ("#7a3b1d", "#6a3420", "#94522c"), (0.78, 0.97), "blotch", 0.6, weight=0.8),
+    Substance(("weathering steel", "corten steel"), "rust",
+              ("#8a4e2e", "#9a5a34"), (0.7, 0.9), "blotch", 0.4, weight=0.6),
 )
 
 WOODS = (
@@ -84,6 +97,22 @@ WOODS = (
               (0.75, 0.95), "grain", 0.5, weight=1.2),
     Substance(("cork",), "wood", ("#b98a5a", "#a87848"), (0.8, 0.95), "speckle", 0.4, weight=0.7),
     Substance(("bark", "tree bark"), "wood", ("#5a4a3c", "#4a3a2e", "#6a5848"), (0.85, 0.98), "veins", 0.6, weight=0.8),
+    Substance(("beech", "elm", "alder", "poplar"), "wood",
+              ("#cfa878", "#c49a68"), (0.45, 0.75), "grain", 0.35, weight=0.6),
+    Substance(("chestnut wood", "hickory", "acacia wood"), "wood",
+              ("#8e6038", "#a07044"), (0.4, 0.7), "grain", 0.45, weight=0.6),
+    Substance(("redwood", "larch", "fir", "cypress wood"), "wood",
+              ("#a4603c", "#b4754a"), (0.5, 0.8), "grain", 0.4, weight=0.6),
+    Substance(("sandalwood", "olive wood"), "wood", ("#b48c5a", "#a47c4c"), (0.4, 0.65), "grain", 0.45, weight=0.4),
+    Substance(("plywood", "chipboard", "particle board", "fiberboard"), "wood",
+              ("#c8a672", "#b8955f"), (0.65, 0.85), "speckle", 0.3, weight=0.6),
+    Substance(("wicker", "rattan", "straw", "thatch", "hay"), "wood",
+              ("#c4a05c", "#b08c4c", "#d0b070"), (0.75, 0.95), "weave", 0.5, weight=0.8),
+    Substance(("wenge", "blackwood"), "wood", ("#3a2a20", "#443428"), (0.4, 0.65), "grain", 0.35, weight=0.4),
+    Substance(("balsa wood",), "wood", ("#e2cda6", "#d8c298"), (0.6, 0.85), "grain", 0.2, weight=0.4),
+    Substance(("varnished wood", "lacquered wood", "parquet"), "wood",
+              ("#9c6232", "#84502a", "#b0763e"), (0.06, 0.25), "grain", 0.45),
+    Substance(("charred wood", "burnt wood"), "wood", ("#26211e", "#302a26"), (0.8, 0.96), "cells", 0.4, weight=0.6),
 )
 
 STONES = (
@@ -114,6 +143,30 @@ STONES = (
     Substance(("lava rock", "volcanic rock"), "stone", ("#3a322e", "#2e2826"), (0.85, 0.98), "blotch", 0.4, weight=0.7),
     Substance(("dirt", "soil", "mud", "earth"), "stone", ("#5a4430", "#4c3a28", "#6a5038"), (0.88, 0.99), "blotch", 0.4,
               weight=1),
+    Substance(("quartz", "rock crystal", "crystal"), "stone",
+              ("#dedcd8", "#d0ccc8"), (0.05, 0.25), "veins", 0.2, weight=0.6),
+    Substance(("onyx", "jet"), "stone", ("#17171a", "#202024"), (0.04, 0.2), "lightveins", 0.2, weight=0.6),
+    Substance(("alabaster", "gypsum", "talc"), "stone",
+              ("#ece6dc", "#e2dace"), (0.35, 0.65), "veins", 0.15, weight=0.6),
+    Substance(("gneiss", "schist"), "stone", ("#8a8886", "#76726e"), (0.5, 0.8), "strata", 0.5, weight=0.5),
+    Substance(("shale", "mudstone", "siltstone"), "stone",
+              ("#6a645e", "#7a7268"), (0.7, 0.92), "strata", 0.35, weight=0.6),
+    Substance(("flint", "chert"), "stone", ("#5a5854", "#6e6a62"), (0.25, 0.5), "blotch", 0.3, weight=0.4),
+    Substance(("pumice", "tuff"), "stone", ("#b8b0a6", "#a8a094"), (0.85, 0.98), "speckle", 0.35, weight=0.5),
+    Substance(("gravel", "pebbles", "rubble"), "stone",
+              ("#8c867e", "#9a948a", "#76716a"), (0.7, 0.95), "cells", 0.6, weight=0.6),
+    Substance(("serpentine",), "stone", ("#4e6a52", "#5a7860"), (0.25, 0.5), "veins", 0.3, weight=0.4),
+    Substance(("red granite", "porphyry", "pink granite"), "stone",
+              ("#8e5a50", "#a26c60"), (0.2, 0.5), "speckle", 0.6, weight=0.6),
+    Substance(("beige marble", "cream marble"), "stone",
+              ("#dccdb2", "#d2c0a2"), (0.1, 0.35), "veins", 0.35, weight=0.6),
+    Substance(("pink marble",), "stone", ("#d8b0a4", "#cfa298"), (0.1, 0.35), "veins", 0.35, weight=0.5),
+    Substance(("terrazzo",), "stone", ("#d4cec6", "#c8c0b6"), (0.15, 0.4), "speckle", 0.7, weight=0.5),
+    Substance(("adobe", "mud brick", "rammed earth"), "stone",
+              ("#b07a52", "#9e6c46"), (0.88, 0.98), "strata", 0.25, weight=0.6),
+    Substance(("flagstone", "paving stone", "masonry"), "stone",
+              ("#7c7870", "#8c867c"), (0.75, 0.92), "bricks", 0.45, weight=0.6),
+    Substance(("dolomite", "chalkstone"), "stone", ("#cfc8bc", "#dad4c8"), (0.6, 0.85), "blotch", 0.2, weight=0.4),
 )
 
 CERAMICS = (
@@ -131,6 +184,11 @@ CERAMICS = (
               paintable=True, weight=1),
     Substance(("enamel", "enameled metal"), "ceramic", ("#e4e2dc", "#2c4a80", "#902828"), (0.05, 0.2), "plain", 0.05,
               paintable=True, weight=1),
+    Substance(("bisque", "unglazed ceramic", "raw clay"), "ceramic",
+              ("#d4b090", "#c8a282"), (0.7, 0.9), "plain", 0.1, weight=0.6),
+    Substance(("delftware", "majolica"), "ceramic", ("#e4e6ea", "#3050a0"), (0.05, 0.2), "plain", 0.1, weight=0.4),
+    Substance(("roof tiles", "clay tiles"), "ceramic",
+              ("#a8563a", "#b4643f"), (0.6, 0.85), "bricks", 0.35, weight=0.6),
 )
 
 PLASTICS = (
@@ -147,6 +205,21 @@ PLASTICS = (
               "plain", 0.05, paintable=True, weight=1),
     Substance(("wax", "candle wax"), "plastic", ("#e8dcc0", "#e0d0b0"), (0.35, 0.6), "plain", 0.1, paintable=True,
               weight=0.7),
+    Substance(("pvc", "polypropylene", "polycarbonate", "thermoplastic"), "plastic",
+              ("#d4d4d4", "#3050a0", "#c03030", "#303030"), (0.15, 0.45), "plain", 0.04, paintable=True, weight=1.2),
+    Substance(("resin", "epoxy", "epoxy resin"), "plastic",
+              ("#d8c8a0", "#b08040", "#40708a"), (0.04, 0.25), "plain", 0.06, paintable=True, weight=0.8),
+    Substance(("foam", "styrofoam", "polystyrene", "sponge"), "plastic",
+              ("#eae8e2", "#e0dccc", "#e0c048"), (0.85, 0.98), "speckle", 0.12, paintable=True, weight=0.8),
+    Substance(("bakelite",), "plastic", ("#4a2a1c", "#201814"), (0.12, 0.3), "plain", 0.06, weight=0.4),
+    Substance(("plexiglass", "perspex", "acrylic glass"), "plastic",
+              ("#c8d4d8", "#b02020", "#2040a0"), (0.01, 0.1), "plain", 0.02, paintable=True, weight=0.6),
+    Substance(("carbon fiber", "carbon fibre", "fiberglass"), "plastic",
+              ("#1e1e20", "#2a2a2c"), (0.15, 0.4), "weave", 0.35, weight=0.8),
+    Substance(("tar", "bitumen", "pitch"), "plastic", ("#141414", "#1c1b1a"), (0.15, 0.5), "plain", 0.1, weight=0.5),
+    Substance(("candy", "jelly", "gelatin", "bubble gum"), "plastic",
+              ("#d83a5a", "#e89ab0", "#58a838"), (0.04, 0.3), "plain", 0.06, paintable=True, weight=0.7),
+    Substance(("soap",), "plastic", ("#e8e0d0", "#d4dcc8"), (0.3, 0.55), "plain", 0.06, paintable=True, weight=0.4),
 )
 
 PAINTS = (
@@ -157,6 +230,12 @@ PAINTS = (
               weight=1.5),
     Substance(("car paint", "lacquered surface"), "paint", ("#a01818", "#183870", "#181818", "#d8d8d8"), (0.02, 0.15),
               "plain", 0.03, paintable=True, weight=1.5),
+    Substance(("chalk paint", "whitewash", "matte paint"), "paint",
+              ("#e4e0d8", "#9ab0a8"), (0.75, 0.95), "blotch", 0.08, paintable=True),
+    Substance(("powder coated metal", "powder coating"), "paint",
+              ("#303234", "#c8c8c8", "#a02020"), (0.35, 0.6), "plain", 0.04, paintable=True, weight=0.8),
+    Substance(("spray paint",), "paint",
+              ("#c03030", "#3060a0", "#e0b020"), (0.3, 0.6), "plain", 0.06, paintable=True, weight=0.6),
 )
 
 FABRICS = (
@@ -175,6 +254,20 @@ FABRICS = (
               (0.88, 1.0), "weave", 0.45, weight=1.5),
     Substance(("carpet", "plush"), "fabric", ("#8a7a6a", "#7a3a3a", "#4a5a7a"), (0.92, 1.0), "speckle", 0.3,
               paintable=True, weight=1),
+    Substance(("fleece", "cashmere", "mohair"), "fabric",
+              ("#d0c4b0", "#8a8a90"), (0.9, 1), "speckle", 0.2, paintable=True, weight=0.8),
+    Substance(("corduroy",), "fabric",
+              ("#7a5a3a", "#5a4a3a", "#3a4a5a"), (0.85, 0.97), "streaks", 0.35, paintable=True, weight=0.6),
+    Substance(("lace", "tulle", "chiffon", "gauze"), "fabric",
+              ("#ece6de", "#e0d8d0"), (0.7, 0.9), "weave", 0.2, paintable=True, weight=0.6),
+    Substance(("rope", "hemp", "twine", "sisal"), "fabric",
+              ("#b89a6c", "#c8ac80"), (0.88, 1), "weave", 0.5, weight=0.7),
+    Substance(("synthetic fabric", "lycra", "spandex", "polyamide"), "fabric",
+              ("#303034", "#a8a8b0", "#3050a0"), (0.5, 0.75), "weave", 0.15, paintable=True, weight=0.9),
+    Substance(("towel", "terry cloth"), "fabric",
+              ("#e4e0d8", "#a8c0d0"), (0.92, 1), "speckle", 0.2, paintable=True, weight=0.5),
+    Substance(("tartan", "plaid", "brocade"), "fabric",
+              ("#8a2a2a", "#2a4a3a", "#3a3a6a"), (0.8, 0.95), "weave", 0.4, weight=0.5),
 )
 
 ORGANICS = (
@@ -204,6 +297,34 @@ ORGANICS = (
     Substance(("snow", "frost", "sugar", "salt"), "ice", ("#f0f2f4", "#e8ecf0"), (0.7, 0.95), "blotch", 0.05, weight=1),
     Substance(("ice", "frozen ice", "glacier ice"), "ice", ("#b4d0dc", "#c4dce6", "#a4c4d4"), (0.02, 0.25), "veins",
               0.25, weight=1.2),
+    Substance(("patent leather",), "leather",
+              ("#141414", "#6a1418"), (0.03, 0.15), "plain", 0.05, paintable=True, weight=0.5),
+    Substance(("nubuck", "suede leather", "buckskin"), "leather",
+              ("#a8825a", "#8a6844"), (0.85, 0.98), "blotch", 0.15, paintable=True, weight=0.6),
+    Substance(("fur", "animal fur", "brown fur"), "organic",
+              ("#6a4c34", "#8a6a4a", "#4a3a2c"), (0.8, 0.95), "streaks", 0.45, weight=0.8),
+    Substance(("sheepskin", "white fur"), "organic", ("#e6dccb", "#dcd0bc"), (0.9, 1), "cells", 0.25, weight=0.5),
+    Substance(("feathers",), "organic", ("#dcd8d0", "#6a5a4a"), (0.7, 0.9), "streaks", 0.3, weight=0.4),
+    Substance(("newspaper", "newsprint"), "paper", ("#cfcabc", "#c4bead"), (0.88, 0.97), "speckle", 0.2, weight=0.4),
+    Substance(("kraft paper", "paper bag"), "paper", ("#b08858", "#bc9464"), (0.85, 0.96), "blotch", 0.1, weight=0.5),
+    Substance(("meat", "raw meat"), "organic", ("#a83a34", "#94302c"), (0.2, 0.45), "veins", 0.35, weight=0.5),
+    Substance(("bread", "crust", "cookie", "biscuit"), "organic",
+              ("#b87a3c", "#c88e4e", "#a4682e"), (0.82, 0.97), "speckle", 0.3, weight=0.7),
+    Substance(("eggshell",), "organic", ("#ecdcc4", "#e4d0b4"), (0.45, 0.65), "speckle", 0.08, weight=0.4),
+    Substance(("seashell", "shell", "conch"), "organic",
+              ("#e8d4c0", "#e0c4ac"), (0.15, 0.4), "strata", 0.25, weight=0.5),
+    Substance(("horn", "antler", "tortoiseshell"), "organic",
+              ("#5e4630", "#7a5c3c"), (0.15, 0.4), "streaks", 0.4, weight=0.5),
+    Substance(("seaweed", "algae"), "organic", ("#2e4a2a", "#3a5a30"), (0.2, 0.5), "blotch", 0.3, weight=0.4),
+    Substance(("cactus", "succulent"), "organic", ("#4e7a44", "#5c8850"), (0.4, 0.65), "strata", 0.25, weight=0.4),
+    Substance(("hair",), "organic", ("#3a2a1e", "#5a4028"), (0.3, 0.5), "streaks", 0.4, weight=0.4),
+    Substance(("lemon peel", "banana peel"), "organic",
+              ("#e4c832", "#e8d040"), (0.35, 0.6), "speckle", 0.12, weight=0.4),
+    Substance(("tomato", "strawberry"), "organic", ("#b8201c", "#c42a24"), (0.15, 0.4), "plain", 0.1, weight=0.4),
+    Substance(("beeswax", "honeycomb"), "organic", ("#d8a03c", "#c88e30"), (0.4, 0.65), "cells", 0.25, weight=0.4),
+    Substance(("ash", "soot", "cinder"), "organic",
+              ("#5a5856", "#3a3938", "#7a7876"), (0.88, 0.99), "blotch", 0.3, weight=0.5),
+    Substance(("cotton wool", "clouds"), "organic", ("#f0f0f0", "#e8eaec"), (0.9, 1), "blotch", 0.05, weight=0.4),
 )
 
 GEMS = (
@@ -217,33 +338,16 @@ GEMS = (
     Substance(("turquoise stone", "opal"), "gem", ("#48b0a8", "#5cc0b8"), (0.1, 0.3), "veins", 0.3, weight=0.6),
     Substance(("pearl", "mother of pearl"), "gem", ("#ece6e0", "#e4dcd8"), (0.1, 0.25), "plain", 0.08, weight=0.7),
     Substance(("amber", "honey", "topaz"), "gem", ("#b8681c", "#c87a24"), (0.03, 0.15), "blotch", 0.15, weight=0.7),
+    Substance(("diamond", "cubic zirconia"), "gem", ("#d8dce0", "#e2e6ea"), (0, 0.05), "cells", 0.1, weight=0.6),
+    Substance(("carnelian", "agate"), "gem", ("#a84a24", "#b85c30"), (0.05, 0.2), "strata", 0.35, weight=0.5),
+    Substance(("citrine",), "gem", ("#d8a42c", "#e0b440"), (0.02, 0.12), "plain", 0.1, weight=0.3),
+    Substance(("peridot", "tourmaline"), "gem", ("#6a9a2c", "#5a8a34"), (0.02, 0.12), "plain", 0.1, weight=0.3),
+    Substance(("moonstone",), "gem", ("#d4d8de", "#c8ced6"), (0.08, 0.25), "blotch", 0.12, weight=0.3),
+    Substance(("rose quartz",), "gem", ("#e0b0b4", "#d8a4aa"), (0.05, 0.2), "veins", 0.15, weight=0.4),
+    Substance(("tiger eye",), "gem", ("#8a5a20", "#a06c28"), (0.05, 0.2), "streaks", 0.5, weight=0.3),
 )
 
 SUBSTANCES = METALS + CORRODED + WOODS + STONES + CERAMICS + PLASTICS + PAINTS + FABRICS + ORGANICS + GEMS
-
-COLORS = {
-    "white": "#eeeeee", "black": "#1a1a1a", "gray": "#808080", "grey": "#808080", "red": "#c01818", "green": "#1f8a2c",
-    "blue": "#1f45b8", "yellow": "#e8cc18", "orange": "#e87818", "purple": "#7a22a0", "pink": "#ee86ac",
-    "brown": "#6e4424", "beige": "#d8c8a4", "cream": "#f0e6c8", "tan": "#c8a478", "turquoise": "#30c0b8",
-    "cyan": "#20c0d8", "magenta": "#cc20a0", "violet": "#7a38c8", "lime": "#98d820", "olive": "#6c6c20",
-    "navy": "#14204c", "maroon": "#601818", "teal": "#107878", "lavender": "#b8a4dc", "salmon": "#f08a74",
-    "coral": "#f4745c", "mint": "#9ce0b8", "khaki": "#b4a878", "mustard": "#d0a020", "charcoal": "#36383c",
-    "scarlet": "#cc2010", "burgundy": "#5c1024", "indigo": "#342080", "lilac": "#c4a0d0", "peach": "#f8c4a0",
-    "rose": "#e05478", "azure": "#3c98ec", "aqua": "#50d8d0", "emerald green": "#109050", "forest green": "#1c5020",
-    "sky blue": "#80bce8", "royal blue": "#2848c0", "dark blue": "#14286c", "light blue": "#98c4e8",
-    "dark green": "#144820", "light green": "#90d48c", "dark red": "#781010", "light gray": "#b8b8b8",
-    "dark gray": "#444444", "dark brown": "#40281a", "light brown": "#a87c54", "bright yellow": "#f8e010",
-    "bright red": "#e01010", "pale pink": "#f0c4cc", "pale yellow": "#f0e8a8", "pale blue": "#bcd4e8",
-    "hot pink": "#f0409c", "neon green": "#50f030", "off white": "#e8e4da", "rust colored": "#a04820",
-    "blue-green": "#14807c", "plum": "#6c2858", "fuchsia": "#d82890", "ochre": "#c08428", "sepia": "#6c4c34",
-    "sand colored": "#d4bc90", "wine red": "#641828", "brick red": "#a43c2c", "cobalt blue": "#1440a4",
-    "sea green": "#2c8c64", "apricot": "#f4b484", "cherry red": "#b01028", "blood red": "#7c0a0a",
-    "lemon yellow": "#f0e430", "jet black": "#0e0e0e", "snow white": "#f4f4f4", "slate gray": "#5c6670",
-    "steel blue": "#4c7ca8", "midnight blue": "#141c40", "chocolate brown": "#4c2c1a", "caramel": "#b07434",
-    "copper colored": "#b46c44", "ginger": "#b86424", "periwinkle": "#9098dc", "orchid": "#c86cc4",
-    "aquamarine": "#70d8b8", "pastel green": "#b4e0b0", "pastel blue": "#b0cce8", "pastel pink": "#f0c0d0",
-}
-"""Colour names and their sRGB."""
 
 FINISHES = {
     # word: roughness range it asks for

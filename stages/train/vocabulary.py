@@ -1,12 +1,15 @@
 """Makes the word-vector table of the text encoder; run once by a developer, its result is shipped.
 
-Words are the whole words of MiniLM's own vocabulary plus ours; a word's vector is its sentence embedding averaged over
-a few contexts, projected on the directions in which words about materials, colours and objects differ, in 8 bits.
-Needs the optional extra `vocabulary` (transformers) and a folder with sentence-transformers/all-MiniLM-L6-v2
-(Apache-2.0; the SHA-256 of its weights is recorded in the table).
+Words are the whole words of MiniLM's own vocabulary plus ours. A word's vector is the embedding of the word in a few
+contexts and of what a dictionary says of it ("taupe: a greyish brown"), so that a rare word lies near the common ones that
+explain it; projected on the directions in which words about materials, colours and objects differ, in 8 bits.
+Needs the optional extra `vocabulary` (transformers), a folder with sentence-transformers/all-MiniLM-L6-v2 (Apache-2.0) and
+the database files of Princeton WordNet 3.1 (WordNet licence). The SHA-256 of both are recorded in the table.
 """
 
 import re
+from collections import defaultdict
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +18,8 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import Provenance, save_npz, sha256_file
 from stages.prior.text import VOCABULARY
-from stages.train.substances import COLORS, FINISHES, FINISHES_METAL, HELD_OUT, OBJECTS, SUBSTANCES
+from stages.train.colors import WORDS
+from stages.train.substances import FINISHES, FINISHES_METAL, HELD_OUT, OBJECTS, SUBSTANCES
 
 CONTEXTS = ("{}", "{} material", "{} colored texture")
 TOPICS = ("material", "texture", "surface", "metal", "wood", "stone", "fabric", "plastic", "ceramic", "color", "paint",
@@ -36,16 +40,25 @@ OWN = ("verdigris", "terracotta", "pewter", "gunmetal", "lacquered", "varnished"
        "celadon", "pistachio", "avocado", "heliotrope", "mulberry", "aubergine", "eggplant", "tangerine", "cinnamon")
 
 
-def make_vocabulary(model_folder: Path, out: Path, size: int = 14000, dims: int = 64) -> None:
+PARTS = ("data.noun", "data.adj")
+"""Files of WordNet that are read."""
+
+KINDS = ("27", "07", "00", "20", "06")
+"""WordNet's lexicographer files that matter most here: substances, attributes (colours), adjectives, plants, artefacts."""
+
+SENSES = 3
+"""Meanings of a word that its vector takes in."""
+
+
+def make_vocabulary(model_folder: Path, wordnet: Path, out: Path, size: int = 14000, dims: int = 96) -> None:
     """Write the table.
 
     Args:
-        model_folder: all-MiniLM-L6-v2 as published (model.safetensors, tokenizer.json). size: words to keep, those
-        nearest to our topics. dims: length of a vector.
+        model_folder: all-MiniLM-L6-v2 as published (model.safetensors, tokenizer.json). wordnet: folder with `PARTS`.
+        size: words to keep, those nearest to our topics. dims: length of a vector.
     """
     words = sorted(set(model_words(model_folder)) | set(domain_words()))
-    embedded = embed(model_folder, words)  # (W, 384)
-    embedded -= embedded.mean(0)
+    embedded = word_vectors(model_folder, wordnet, words)  # (W, 384)
     domain = np.array([words.index(word) for word in domain_words()])
     closeness = (unit(embedded) @ unit(embedded[domain]).T).max(1)
     closeness[domain] = 2.0
@@ -61,13 +74,51 @@ def make_vocabulary(model_folder: Path, out: Path, size: int = 14000, dims: int 
     }
     arrays["words"] = np.frombuffer(b"\n".join(arrays["words"].tolist()), np.uint8).copy()
     source = {"model": sha256_file(model_folder / "model.safetensors")}
+    source |= {part: sha256_file(wordnet / part) for part in PARTS}
     save_npz(out, VOCABULARY, arrays, Provenance({"size": size, "dims": dims}, None, source))
+
+
+def word_vectors(model_folder: Path, wordnet: Path, words: list[str]) -> NDArray[np.float32]:
+    """(W, 384), about their mean: of the word in `CONTEXTS`, and of its dictionary entry where there is one."""
+    contexts = embed(model_folder, [context.format(word) for context in CONTEXTS for word in words])
+    alone = centred(contexts.reshape(len(CONTEXTS), len(words), -1).mean(0))
+    entries = dictionary(wordnet)
+    told = {i: entry(word, entries[word]) for i, word in enumerate(words) if word in entries}
+    alone[list(told)] += centred(embed(model_folder, list(told.values())))
+    return unit(alone)
+
+
+def dictionary(wordnet: Path) -> dict[str, list[tuple[str, list[str], str]]]:
+    """The meanings of every word: kind, all words of that meaning, and its explanation; those of `KINDS` first."""
+    entries = defaultdict(list)
+    for part in PARTS:
+        for kind, lemmas, gloss in synsets(wordnet / part):
+            for word in lemmas:
+                entries[word].append((kind, lemmas, gloss))
+    rank = {kind: i for i, kind in enumerate(KINDS)}
+    return {word: sorted(found, key=lambda e: rank.get(e[0], len(KINDS))) for word, found in entries.items()}
+
+
+def synsets(path: Path) -> Iterator[tuple[str, list[str], str]]:
+    """Each meaning in a file of WordNet, without the examples. Source: WordNet's manual page wndb(5WN)."""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        if not line.startswith("  "):  # the licence
+            head, gloss = line.split(" | ", 1)
+            fields = head.split()
+            lemmas = fields[4 : 4 + 2 * int(fields[3], 16) : 2]
+            yield fields[1], [w.split("(")[0].replace("_", " ").lower() for w in lemmas], gloss.split('; "')[0].strip()
+
+
+def entry(word: str, meanings: list[tuple[str, list[str], str]]) -> str:
+    """What the dictionary says of a word, its synonyms included, as one text."""
+    told = (", ".join(w for w in lemmas if w != word) + " " + gloss for _, lemmas, gloss in meanings[:SENSES])
+    return f"{word}: " + ". ".join(told)
 
 
 def domain_words() -> list[str]:
     """Every word of our captions and of the list above, sorted."""
     phrases = [name for substance in SUBSTANCES for name in substance.names]
-    phrases += [*COLORS, *FINISHES, *FINISHES_METAL, *OBJECTS, *TOPICS, *OWN, *(word for word, _ in HELD_OUT)]
+    phrases += [*WORDS, *FINISHES, *FINISHES_METAL, *OBJECTS, *TOPICS, *OWN, *(word for word, _ in HELD_OUT)]
     return sorted({word for phrase in phrases for word in re.findall("[a-z]+", phrase.lower())})
 
 
@@ -88,22 +139,24 @@ def unit(vectors: NDArray) -> NDArray:
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
 
-def embed(folder: Path, words: list[str]) -> NDArray[np.float32]:
-    """Mean sentence embedding of each word over `CONTEXTS`. Returns: (W, 384)."""
+def centred(vectors: NDArray) -> NDArray:
+    """Rows about their mean, at length 1."""
+    return unit(vectors - vectors.mean(0))
+
+
+def embed(folder: Path, texts: list[str]) -> NDArray[np.float32]:
+    """Sentence embeddings (T, 384) of unit length."""
     from transformers import AutoModel, AutoTokenizer  # an optional extra, needed here only
 
     tokenizer, model = AutoTokenizer.from_pretrained(folder), AutoModel.from_pretrained(folder).eval()
-    total = np.zeros((len(words), model.config.hidden_size), "f4")
-    for context in CONTEXTS:
-        phrases = [context.format(word) for word in words]
-        for start in range(0, len(words), 512):
-            batch = tokenizer(phrases[start : start + 512], padding=True, return_tensors="pt")
-            with torch.no_grad():
-                hidden = model(**batch).last_hidden_state
-            mask = batch["attention_mask"][..., None]
-            mean = (hidden * mask).sum(1) / mask.sum(1)
-            total[start : start + 512] += torch.nn.functional.normalize(mean, dim=-1).numpy() / len(CONTEXTS)
-    return total
+    order, parts = np.argsort([len(text) for text in texts]), []  # alike long, little padding
+    for rows in np.array_split(order, -(-len(texts) // 256)):
+        batch = tokenizer([texts[i] for i in rows], padding=True, truncation=True, return_tensors="pt")
+        with torch.no_grad():
+            hidden = model(**batch).last_hidden_state
+        mask = batch["attention_mask"][..., None]
+        parts.append(torch.nn.functional.normalize((hidden * mask).sum(1) / mask.sum(1), dim=-1).numpy())
+    return np.concatenate(parts)[np.argsort(order)]
 
 
 if __name__ == "__main__":
@@ -111,9 +164,10 @@ if __name__ == "__main__":
 
     @click.command()
     @click.argument("model_folder", type=click.Path(exists=True, path_type=Path))
+    @click.argument("wordnet", type=click.Path(exists=True, path_type=Path))
     @click.argument("out", type=click.Path(path_type=Path))
-    def main(model_folder: Path, out: Path) -> None:
-        """Write the word-vector table OUT from the model in MODEL_FOLDER."""
-        make_vocabulary(model_folder, out)
+    def main(model_folder: Path, wordnet: Path, out: Path) -> None:
+        """Write the word-vector table OUT from the model in MODEL_FOLDER and the dictionary in the folder WORDNET."""
+        make_vocabulary(model_folder, wordnet, out)
 
     main()

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
-from stages.conditions.maps import map_names
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import conditions
 from stages.core.artifact import load_npz, read_exr, read_manifest, write_exr
@@ -15,7 +15,11 @@ from stages.core.errors import ArtifactError, InputError, OutputError
 from stages.core.frames import camera_rays
 from stages.core.schemas import CAMERAS, CONDITIONS
 from stages.core.shading import F0, KNOTS
-from stages.core.views import read_geometry, read_transport
+from stages.core.views import light_map_names, read_geometry, read_light_maps, read_transport
+from stages.light.bounce import blender_light_maps
+from stages.light.gbuffer import trace_view
+from stages.light.lights import BUILTIN
+from stages.light.transport import QUALITY
 from tests.light import scenes
 from tests.prepared import save_prep
 
@@ -66,8 +70,8 @@ def test_maps_follow_from_the_transport(made: Path) -> None:
     geometry = read_geometry(made, 2)
     transport = read_transport(made, 2, "clear_sky", geometry.mask)
     maps = read_exr(made / "view_002" / "maps_clear_sky.exr").channels
-    assert map_names()[1] == "light_m0_r0.5"
-    assert set(maps) == {"depth"} | {f"{n}.{c}" for n in ["normal", *map_names()] for c in "RGB"}
+    assert light_map_names()[1] == "light_m0_r0.5"
+    assert set(maps) == {"depth"} | {f"{n}.{c}" for n in ["normal", *light_map_names()] for c in "RGB"}
     k = KNOTS.index(0.5)
     expected = transport.E[:, 1] + F0 * transport.A[:, k, 1] + transport.B[:, k, 1]
     assert maps["light_m0_r0.5.G"].dtype == np.float32
@@ -75,6 +79,24 @@ def test_maps_follow_from_the_transport(made: Path) -> None:
     metal = (transport.A[:, 0, 2] + transport.B[:, 0, 2]).float().numpy()
     assert maps["light_m1_r0.B"][geometry.mask] == pytest.approx(metal, rel=5e-3, abs=1e-3)
     assert (maps["light_m1_r1.R"][~geometry.mask] == 0).all()
+
+
+def test_the_profile_sd_adds_smooth_normals_and_light_maps_with_a_bounce(prep: Path, made: Path, tmp_path: Path) -> None:
+    out = tmp_path / "conditions"
+    options = dataclasses.replace(SMALL, views=1, env=("studio",), maps=False, profile="sd")
+    conditions(prep, out, options)
+    provenance, files = read_manifest(out, CONDITIONS)
+    assert provenance.extra["profile"] == "sd"
+    assert {"view_000/sd/geometry.exr", "view_000/sd/studio.exr", "view_000/studio.exr"} <= set(files)
+    geometry, smooth = read_geometry(out, 0), read_geometry(out, 0, "sd")
+    assert np.array_equal(geometry.mask, smooth.mask) and np.array_equal(geometry.depth, smooth.depth)
+    maps = read_light_maps(out, 0, "studio", geometry.mask, "sd").float()
+    scene = scenes.box_in_corner().shaded_smooth()
+    cameras = load_npz(out / "cameras.npz", CAMERAS)
+    points = trace_view(scene, cameras["c2w"][0], float(cameras["fov_y"][0]), 24, 24)
+    assert smooth.normal[smooth.mask] == pytest.approx(points.n @ cameras["c2w"][0][:3, :3], abs=1e-5)
+    expected = blender_light_maps(scene, points, [BUILTIN["studio"]()], QUALITY["draft"], 0)[0]
+    torch.testing.assert_close(maps, expected, rtol=5e-3, atol=1e-3)
 
 
 def test_manifest_names_what_it_was_made_from(made: Path) -> None:

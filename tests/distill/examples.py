@@ -1,5 +1,6 @@
 """A small conditions folder made from formulas: a sphere of diameter 1 under lights that brighten towards one side."""
 
+import dataclasses
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,8 +14,8 @@ from stages.core.albedo import specular_albedo
 from stages.core.artifact import Provenance, save_npz, write_manifest
 from stages.core.frames import camera_rays, look_at
 from stages.core.schemas import CAMERAS, CONDITIONS
-from stages.core.shading import KNOTS, Transport
-from stages.core.views import Geometry, view_folder, write_geometry, write_transport
+from stages.core.shading import KNOTS, Transport, light_maps
+from stages.core.views import SD, Geometry, view_folder, write_geometry, write_light_maps, write_transport
 
 RADIUS = 0.5
 FOV = np.radians(35.0)
@@ -53,8 +54,11 @@ def gradient_light(name: str, n: NDArray, wo: NDArray) -> Transport:
     return Transport(E, light * albedo[..., :1], light * albedo[..., 1:], torch.from_numpy(cosine).float())
 
 
-def write_conditions(folder: Path, views: int = 4, size: int = 24) -> Path:
-    """Write the folder; four cameras or more on a ring, alternately above and below."""
+def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str = "gltf") -> Path:
+    """Write the folder; four cameras or more on a ring, alternately above and below.
+
+    The light maps of the profile sd are twice as bright as glTF's, and its normals point to the viewer.
+    """
     azimuth = np.arange(views) / views * 2 * np.pi
     elevation = np.where(np.arange(views) % 2, -0.3, 0.5)
     direction = [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
@@ -69,8 +73,14 @@ def write_conditions(folder: Path, views: int = 4, size: int = 24) -> Path:
         write_geometry(folder, view, geometry)
         for name in LIGHTS:
             write_transport(folder, view, name, geometry.mask, gradient_light(name, n, wo))
+            if profile == SD:
+                write_light_maps(folder, view, name, geometry.mask, 2 * light_maps(gradient_light(name, n, wo)), SD)
+        if profile == SD:
+            towards = np.where(geometry.mask[..., None], np.array([0.0, 0, 1]), 0).astype(np.float32)
+            write_geometry(folder, view, dataclasses.replace(geometry, normal=towards), SD)
         files += [f"{view_folder(view)}/{name}.exr" for name in ("geometry", *LIGHTS)]
     extra = {"environments": list(LIGHTS), "views": views, "knots": list(KNOTS), "clamped": {}, "to_world": identity()}
+    extra["profile"] = profile
     write_manifest(folder, CONDITIONS, Provenance(made.options, 0, made.inputs, extra), files)
     return folder
 

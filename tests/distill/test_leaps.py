@@ -3,10 +3,10 @@
 import torch
 from torch import Tensor
 
-from stages.core.shading import KNOTS, Transport, shade
+from stages.core.shading import KNOTS, Material, Transport, shade
 from stages.distill import gauss_newton
 from stages.distill.guidance.base import Response
-from stages.distill.leaps import as_material, leaps
+from stages.distill.leaps import leaps
 from stages.distill.sampling import Sample
 
 POINTS, LIGHTS, PROGRESS = 400, 5, 0.5
@@ -23,15 +23,11 @@ def shaded_mirrors() -> Sample:
     return Sample(zeros, zeros, LIGHTS, transport, rows=torch.arange(POINTS))
 
 
-def asked(target: Tensor) -> "Ask":
-    return Ask(target.view(POINTS, LIGHTS, 3))
-
-
 class Ask:
     """Least squares on the logarithm of radiance."""
 
     def __init__(self, target: Tensor) -> None:
-        self.target = target
+        self.target = target.view(POINTS, LIGHTS, 3)
 
     def __call__(self, radiance: Tensor, part: Sample) -> Response:
         assert part.rows is not None
@@ -46,8 +42,8 @@ def dark_and(roughness: float) -> Tensor:
 def descend(sample: Sample, ask: Ask, x: Tensor, steps: int, leaping: bool) -> Tensor:
     g = torch.Generator().manual_seed(1)
     for _ in range(steps):
-        answer = ask(shade(sample.transport, as_material(x)), sample)
-        goal = (x + gauss_newton.proposal(sample.transport, as_material(x), answer, PROGRESS)).clamp(0, 1)
+        answer = ask(shade(sample.transport, Material.of(x)), sample)
+        goal = (x + gauss_newton.proposal(sample.transport, Material.of(x), answer, PROGRESS)).clamp(0, 1)
         if leaping:
             rows, elsewhere = leaps(sample, x, answer, ask, PROGRESS, g)
             goal[rows] = elsewhere
@@ -57,7 +53,7 @@ def descend(sample: Sample, ask: Ask, x: Tensor, steps: int, leaping: bool) -> T
 
 def test_only_leaps_lead_out_of_a_hollow() -> None:
     sample, start = shaded_mirrors(), dark_and(0.1)
-    ask = asked(shade(sample.transport, as_material(dark_and(0.8))))
+    ask = Ask(shade(sample.transport, Material.of(dark_and(0.8))))
     stuck = descend(sample, ask, start.clone(), 60, leaping=False)
     out = descend(sample, ask, start.clone(), 60, leaping=True)
     assert float((stuck[:, 3] < 0.3).float().mean()) > 0.5, "the case must be a hollow"
@@ -67,7 +63,7 @@ def test_only_leaps_lead_out_of_a_hollow() -> None:
 
 def test_nothing_leaps_away_from_the_truth() -> None:
     sample, truth = shaded_mirrors(), dark_and(0.8)
-    ask = asked(shade(sample.transport, as_material(truth)))
-    answer = ask(shade(sample.transport, as_material(truth)), sample)
+    ask = Ask(shade(sample.transport, Material.of(truth)))
+    answer = ask(shade(sample.transport, Material.of(truth)), sample)
     rows, _ = leaps(sample, truth, answer, ask, PROGRESS, torch.Generator().manual_seed(0))
     assert len(rows) == 0

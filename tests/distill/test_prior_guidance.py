@@ -39,8 +39,8 @@ class FlatPrior:
         tokens = torch.tensor(kind)[:, None, None]
         return TextEmbedding(tokens, torch.ones(len(prompts), 1, dtype=torch.bool), tokens[:, 0])
 
-    def expected_material(self, prompts: list[str]) -> Tensor:
-        return torch.full((len(prompts), 5), 0.5)
+    def expected_material(self, prompts: list[str], heights: Tensor) -> Tensor:
+        return (heights + 0.5)[None, :, None].expand(len(prompts), -1, 5)
 
     def denoise(
         self, x_t: Tensor, t: Tensor, conditions: Tensor, text: TextEmbedding
@@ -98,7 +98,7 @@ def test_all_branches_get_the_same_conditions_and_time(views: Views) -> None:
     sample, radiance, generator = shown(made)
     made.respond(radiance, sample, 0.9, generator)
     t, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
-    assert conditions.shape == (6, 22, SIZE, SIZE)
+    assert conditions.shape == (6, 23, SIZE, SIZE)
     assert torch.equal(conditions[:2], conditions[2:4]) and torch.equal(conditions[:2], conditions[4:])
     assert torch.equal(t[:2], t[2:4]) and torch.equal(t[:2], t[4:]) and int(t.max()) <= 500
 
@@ -108,7 +108,14 @@ def test_a_negative_prompt_without_weight_is_not_asked(views: Views) -> None:
     sample, radiance, generator = shown(made)
     made.respond(radiance, sample, 0.9, generator)
     _, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
-    assert conditions.shape == (4, 22, SIZE, SIZE)
+    assert conditions.shape == (4, 23, SIZE, SIZE)
+
+
+def test_points_learn_what_the_words_call_for_at_their_height(views: Views) -> None:
+    made = guidance(views, 0.0)
+    sample, radiance, generator = shown(made)
+    expected = made.respond(radiance, sample, 0.9, generator).expected
+    torch.testing.assert_close(expected, (sample.points[:, 2:] + 0.5).clamp(0, 1).expand(-1, 5), rtol=0, atol=0.02)
 
 
 def test_same_generator_same_gradient(views: Views) -> None:

@@ -33,8 +33,7 @@ def test_bimodality_is_zero_at_both_ends_and_pushes_away_from_the_middle() -> No
 
 def test_distance_of_means_lets_points_differ() -> None:
     spread = Material(torch.tensor([[0.0] * 3, [1.0] * 3]), torch.tensor([0.2, 0.8]), torch.tensor([0.0, 1.0]))
-    middle = torch.tensor([*[0.21404114] * 3, 0.5, 0.5])  # 0.5 as sRGB
-    assert float(regularizers.distance_of_means(spread, middle)) < 1e-12
-    assert float(regularizers.distance_of_means(material(0.25), middle)) > 0.1
-    linear = 3 * (0.02 * 0.21404114) ** 2
-    assert float(regularizers.distance_of_means(material(0.0), 0.02 * middle)) > 100 * linear, "dark colours count"
+    level, middle = torch.zeros(2), torch.full((2, 5), 0.5)
+    assert float(regularizers.distance_of_means(spread, level, middle)) < 1e-12
+    assert float(regularizers.distance_of_means(spread, torch.tensor([-0.4, 0.4]), middle)) > 0.5, "two bands"
+    assert float(regularizers.distance_of_means(material(0.25), torch.zeros(5), torch.full((5, 5), 0.5))) > 0.1

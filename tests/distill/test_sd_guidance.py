@@ -97,6 +97,18 @@ def asked(model: StableDiffusion, views: Views, progress: float = 0.0, **options
     return *spy.calls[0], sample
 
 
+def test_the_profile_of_the_conditions_decides_on_normals_and_light_maps(model: StableDiffusion, tmp_path: Path) -> None:
+    views = Views(write_conditions(tmp_path / "conditions", size=SIZE, profile="sd"))
+    *_, conditions, _, sample = asked(model, views)
+    images = sample.images
+    assert images is not None and images.maps is not None
+    mask = images.paint(torch.ones(len(sample.points), 1))
+    lights = images.paint(2 * light_maps(sample.transport.to(torch.float32)).flatten(1))
+    towards = images.paint(torch.tensor([[0.0, 0, 1]]).expand(len(sample.points), 3))
+    expected = profile.prepare(images.paint(images.surface.depth[:, None]), towards, mask, lights)
+    torch.testing.assert_close(conditions[: images.count], expected, rtol=0, atol=2e-3)
+
+
 @pytest.mark.parametrize("loss", ["csd", "sds"])
 def test_gradient_is_the_papers_from_three_separate_calls(model: StableDiffusion, views: Views, loss: str) -> None:
     """DreamMat, Eq. 7, and DreamFusion with guidance weight 100, each branch and image predicted by itself."""

@@ -25,7 +25,7 @@ def view(count: int, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor]:
     mask = (x * x + y * y < 1).float()[None, None]
     normal = torch.stack([x, -y, (1 - x * x - y * y).clamp(min=0).sqrt()])[None] * mask
     lights = (0.3 + 0.5 * normal[:, 1:2].clamp(min=0)).expand(1, 18, -1, -1) * mask
-    conditions = Prior.prepare(3 - normal[:, 2:] * 0.5, normal, mask, lights * Prior.exposure(lights, mask))
+    conditions = Prior.prepare(3 - normal[:, 2:] * 0.5, normal, -y / 2.6 * mask, mask, lights * Prior.exposure(lights, mask))
     noise = torch.randn(count, 3, SIZE, SIZE, generator=torch.Generator().manual_seed(seed))
     return noise, conditions.expand(count, -1, -1, -1)
 
@@ -50,7 +50,7 @@ def test_noise_prediction_has_not_changed(prior: Prior, golden) -> None:
     noise, conditions = view(3)
     prompts = prior.embed(["polished gold", "red plastic", ""])
     eps = prior.denoise(noise, torch.tensor([100, 400, 800]), conditions, prompts)[0]
-    expected = prior.expected_material(["polished gold", "red plastic", "oak wood"])
+    expected = prior.expected_material(["polished gold", "red plastic", "oak wood"], torch.tensor([-0.3, 0.3]))
     arrays = {"eps": eps[:, :, ::8, ::8].numpy(), "expected": expected.numpy()}
     golden.check("prior/predict_noise", arrays, atol=0.06)  # bfloat16 differs between processors
 
@@ -84,8 +84,8 @@ def test_the_prompt_steers_the_prediction(prior: Prior) -> None:
 
 def test_expected_material_separates_what_words_separate(prior: Prior) -> None:
     gold, steel, red, rubber, chrome = prior.expected_material(
-        ["gold", "brushed steel", "red plastic", "black rubber", "polished chrome"]
-    ).unbind()
+        ["gold", "brushed steel", "red plastic", "black rubber", "polished chrome"], torch.zeros(1)
+    )[:, 0].unbind()
     assert min(gold[4], steel[4], chrome[4]) > 0.7 and max(red[4], rubber[4]) < 0.3
     assert gold[2] < gold[0] - 0.15 and red[0] > red[1] + 0.3
     assert rubber[:3].max() < 0.3 and chrome[3] < 0.25 < rubber[3]

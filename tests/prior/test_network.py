@@ -15,7 +15,7 @@ def text(count: int) -> TextEmbedding:
 def test_shapes_for_every_set_of_conditions() -> None:
     torch.manual_seed(0)
     denoiser = Denoiser().eval()
-    conditions = torch.rand(3, 22, 64, 64)
+    conditions = torch.rand(3, 23, 64, 64)
     conditions[1, 4:], conditions[2] = DROPPED, DROPPED
     with torch.no_grad():
         x, t, a = torch.randn(3, 3, 64, 64), torch.tensor([0, 500, 999]), torch.full((3, 1, 1, 1), 0.5)
@@ -30,7 +30,7 @@ def test_light_enters_the_guess_only_where_it_is_given() -> None:
     for parameter in denoiser.leave.parameters():
         torch.nn.init.zeros_(parameter)
     x, t, a = torch.randn(1, 3, 64, 64), torch.tensor([500]), torch.full((1, 1, 1, 1), 0.5)
-    dark, unknown = torch.zeros(1, 22, 64, 64), torch.full((1, 22, 64, 64), DROPPED)
+    dark, unknown = torch.zeros(1, 23, 64, 64), torch.full((1, 23, 64, 64), DROPPED)
     gain = torch.tensor(0.5).rsqrt()
     with torch.no_grad():
         with_light, without = denoiser(x, t, a, dark, text(1))[0], denoiser(x, t, a, unknown, text(1))[0]
@@ -62,7 +62,7 @@ def test_padding_tokens_do_not_matter() -> None:
     present = torch.arange(25)[None] < 4
     moved = torch.where(present[..., None], embedding.tokens, embedding.tokens + 3)
     x, t, a = torch.randn(1, 3, 64, 64), torch.tensor([300]), torch.full((1, 1, 1, 1), 0.5)
-    conditions = torch.rand(1, 22, 64, 64)
+    conditions = torch.rand(1, 23, 64, 64)
     with torch.no_grad():
         one = denoiser(x, t, a, conditions, TextEmbedding(embedding.tokens, present, embedding.pooled))[0]
         two = denoiser(x, t, a, conditions, TextEmbedding(moved, present, embedding.pooled))[0]

@@ -3,7 +3,18 @@ import pytest
 import torch
 
 from stages.prior.model import VOCABULARY_FILE
-from stages.prior.text import MAX_WORDS, TextEmbedding, TextEncoder, Vocabulary, split_words
+from stages.prior.text import (
+    LAYOUTS,
+    MAX_WORDS,
+    SHARES,
+    TOP,
+    Reader,
+    Reading,
+    TextEmbedding,
+    TextEncoder,
+    Vocabulary,
+    split_words,
+)
 
 
 @pytest.fixture(scope="module")
@@ -61,13 +72,13 @@ def test_prompts_are_split_without_articles_accents_and_case() -> None:
 
 def test_long_prompts_are_cut(vocabulary: Vocabulary) -> None:
     vectors, present = vocabulary.encode(["gold " * 50, ""])
-    assert vectors.shape == (2, MAX_WORDS, 64)
+    assert vectors.shape == (2, MAX_WORDS, vocabulary.vectors.shape[1])
     assert present[0].all() and not present[1].any()
 
 
 def test_encoder_ignores_what_follows_the_prompt(vocabulary: Vocabulary) -> None:
     torch.manual_seed(0)
-    encoder = TextEncoder().eval()
+    encoder = TextEncoder(vocabulary.vectors.shape[1]).eval()
     vectors, present = vocabulary.encode(["red plastic", ""])
     noisy = vectors + 5 * (~present)[..., None]
     with torch.no_grad():
@@ -81,3 +92,13 @@ def test_embeddings_expand_and_join() -> None:
     joined = TextEmbedding.cat([one.expand(2), one])
     assert joined.tokens.shape == (3, 5, 8) and joined.pooled.shape == (3, 8)
     assert torch.equal(joined.tokens[0], joined.tokens[2])
+
+
+def test_what_lies_on_top_has_a_border_and_what_else_lies_on_a_coat_is_mixed_in_by_its_share() -> None:
+    torch.manual_seed(0)
+    reader = Reader(4, 16)
+    coats = torch.stack([torch.zeros(3, 5), torch.ones(3, 5)], 1)
+    layout = 40 * torch.eye(len(LAYOUTS))[[0, TOP, LAYOUTS.index("spots")]]
+    found = reader.expected(Reading(coats, layout), torch.tensor([[-0.9, -0.03, 0.0, 0.03, 0.4]] * 3))
+    expected = torch.tensor([[0.0, 0, 0, 0, 0], [0, 0, 0.5, 1, 1], [float(SHARES[LAYOUTS.index("spots")])] * 5])
+    torch.testing.assert_close(found, expected[..., None].expand(3, 5, 5), rtol=0, atol=1e-5)

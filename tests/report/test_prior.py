@@ -14,12 +14,13 @@ from stages.report import prior
 from stages.report.options import PriorReportOptions
 from stages.report.prompts import IDENTIFIED, PROMPTS, Meaning, Prompt
 from stages.report.shapes import SHAPES
-from stages.train.substances import COLORS, FINISHES, OBJECTS, SUBSTANCES
+from stages.train.colors import WORDS
+from stages.train.substances import FINISHES, OBJECTS, SUBSTANCES
 
 
 def test_the_list_is_as_long_and_as_new_as_it_claims() -> None:
     assert len({prompt.text for prompt in PROMPTS}) == len(PROMPTS) >= 60
-    taught = {w for phrase in (*COLORS, *FINISHES, *OBJECTS, *(n for s in SUBSTANCES for n in s.names)) for w in phrase.split()}
+    taught = {w for phrase in (*WORDS, *FINISHES, *OBJECTS, *(n for s in SUBSTANCES for n in s.names)) for w in phrase.split()}
     for prompt in PROMPTS:
         if prompt.unseen:
             assert not set(prompt.text.split()) <= taught, prompt.text

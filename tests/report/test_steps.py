@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from stages.core.shading import Material
 from stages.light.light_set import light_set
 from stages.report import steps
 from stages.report.monte_carlo import shade_monte_carlo
@@ -21,7 +22,7 @@ def test_monte_carlo_averages_to_the_quadrature(monkeypatch: pytest.MonkeyPatch)
     runs = []
     for _ in range(200):
         values = materials.clone().requires_grad_()
-        shade_monte_carlo(scene, points, light, steps.as_material(values), generator).sum().backward()
+        shade_monte_carlo(scene, points, light, Material.of(values), generator).sum().backward()
         assert values.grad is not None
         runs.append(values.grad)
     stacked = torch.stack(runs)

@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from stages.prior.text import split_words
+from stages.prior.text import LAYOUTS, SHARES, split_words
 from stages.train import materials
 from stages.train.captions import COMPOSED, Words, caption
+from stages.train.colors import WORDS
 from stages.train.patterns import LATTICE, PATTERNS, noise
-from stages.train.substances import COLORS, HELD_OUT, SUBSTANCES
+from stages.train.substances import HELD_OUT, SUBSTANCES
 
 
 def sphere(count: int = 500) -> materials.Surface:
@@ -79,13 +80,33 @@ def test_the_words_kept_for_tests_are_never_taught() -> None:
     assert len(taught) > 250
     phrases = [word for word, _ in HELD_OUT if " " not in word]
     assert not taught & set(phrases)
-    assert not any(word in name for name in COLORS for word in phrases)
+    assert not any(word in name for name in WORDS for word in phrases)
 
 
-def test_every_substance_can_be_drawn_and_mean_parameters_tell_it() -> None:
+def test_every_substance_can_be_drawn_and_its_points_tell_it() -> None:
     rng = default_rng(0)
     for substance in SUBSTANCES:
         coat = materials.draw_coat(rng, substance)
-        mean = materials.mean_parameters(materials.RandomMaterial("", (coat,), None), rng)
-        assert mean.shape == (5,) and mean[4] == substance.metallic
-        assert np.abs(mean[:3] - coat.color).max() < 0.25
+        values = materials.encoded(coat.evaluate(materials.stand_in(rng, 96)))
+        assert values.shape == (96, 5) and np.all(values[:, 4] == substance.metallic)
+        assert np.abs(values[:, :3].mean(0) - coat.color).max() < 0.25
+
+
+def test_points_know_how_high_they_are() -> None:
+    rng = default_rng(0)
+    coats = tuple(materials.draw_coat(rng, next(s for s in SUBSTANCES if s.metallic == metallic)) for metallic in (0.0, 1.0))
+    layout = materials.Layout("top", 0.5, 1.0, np.ones(3), np.zeros(3))
+    surface = materials.stand_in(rng, 500)
+    height, values = surface.point[:, 2], materials.RandomMaterial("", coats, layout).evaluate(surface)
+    assert np.all(values[height > 0.1, 4] == 1) and np.all(values[height < -0.1, 4] == 0)
+
+
+def test_the_reader_knows_every_layout_and_its_share_of_the_surface() -> None:
+    rng, found = default_rng(0), {kind: [] for kind, _ in materials.KINDS}
+    for _ in range(1500):
+        layout = materials.random_material(rng, composed=1.0).layout
+        assert layout is not None
+        found[layout.kind].append(materials.coverage(layout, materials.stand_in(rng, 24)).mean())
+    assert set(found) == set(LAYOUTS) - {"none"}
+    for kind in set(found) - {"top"}:
+        assert abs(np.mean(found[kind]) - float(SHARES[LAYOUTS.index(kind)])) < 0.05, kind

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from stages.core.artifact import load_npz, sha256_file
+from stages.core.artifact import Provenance, load_npz, sha256_file
 from stages.core.errors import NumericalError
 from stages.core.images import read_image
 from stages.core.progress import silent
-from stages.prior.model import VOCABULARY_FILE, PriorNetwork, load_prior
+from stages.prior.model import VOCABULARY_FILE, PriorNetwork, load_prior, save_weights
 from stages.prior.text import Vocabulary
 from stages.train import prior, render, samples
 from stages.train.batches import CaptionBatches, PictureBatches, Tiles
@@ -40,15 +40,18 @@ def test_batches_depend_on_seed_and_step_alone(shards: list[Path]) -> None:
     one, again, other = (PictureBatches(tiles, 2, 0)[step] for step in (5, 5, 6))
     assert torch.equal(one.image, again.image) and one.captions == again.captions
     assert not torch.equal(one.image, other.image)
-    assert one.image.shape == (2, 3, 64, 64) and one.conditions.shape == (2, 22, 64, 64)
+    assert one.image.shape == (2, 3, 64, 64) and one.conditions.shape == (2, 23, 64, 64)
     outside = one.mask.expand_as(one.image) == 0
     assert one.image[outside].eq(-1).all() and torch.isfinite(one.image).all()
     assert one.material.min() >= 0 and one.material.max() <= 1
 
 
-def test_captions_and_means_agree_in_number() -> None:
-    captions, means = CaptionBatches(5, 0)[0]
-    assert len(captions) == len(means) == 5 and means.shape == (5, 5)
+def test_captions_and_their_materials_agree_in_number() -> None:
+    batch = CaptionBatches(40, 0)[0]
+    assert len(batch.captions) == 40 and batch.coats.shape == (40, 2, 5)
+    single = batch.layout == 0
+    assert 4 < int(single.sum()) < 36
+    assert bool((batch.coats[single, 1] == 0).all()) and bool((batch.coats[~single, 1].sum(1) > 0).all())
 
 
 def test_training_resumes_to_the_same_bytes(tmp_path: Path, quick: None) -> None:
@@ -69,6 +72,15 @@ def test_training_resumes_to_the_same_bytes(tmp_path: Path, quick: None) -> None
     assert np.array_equal(first["curve"][:, :4], second["curve"][:, :4])
 
 
+def test_training_begins_with_what_fits_of_earlier_weights(tmp_path: Path) -> None:
+    earlier, wider = PriorNetwork(8), PriorNetwork(12)  # of other word vectors
+    save_weights(tmp_path / "w.npz", earlier, earlier.flat(), Provenance({}, 0, {}), {"step": 1})
+    prior.begin_with(wider, tmp_path / "w.npz")
+    assert torch.equal(wider.denoiser.enter.weight, earlier.denoiser.enter.weight.half().float())
+    project = wider.text.project.weight
+    assert torch.equal(project[:, :8], earlier.text.project.weight.half().float()) and bool((project[:, 8:] == 0).all())
+
+
 def test_a_finished_run_is_up_to_date_and_its_weights_load(tmp_path: Path, quick: None) -> None:
     done = prior.train_prior(tmp_path, OPTIONS)
     before = sha256_file(done.weights)
@@ -82,13 +94,14 @@ def test_a_finished_run_is_up_to_date_and_its_weights_load(tmp_path: Path, quick
 def test_losses_fall_on_one_batch(shards: list[Path]) -> None:
     torch.manual_seed(0)
     vocabulary = Vocabulary.load(VOCABULARY_FILE)
-    state = prior.State(PriorNetwork(64), torch.device("cpu"))
-    batch = PictureBatches(Tiles(shards), 2, 0)[0]
+    state = prior.State(PriorNetwork(vocabulary.vectors.shape[1]), torch.device("cpu"))
+    batch, captions = PictureBatches(Tiles(shards), 2, 0)[0], CaptionBatches(8, 0)[0]
     alpha_bar = prior.diffusion.cosine_schedule()
     losses = []
     for _ in range(12):
         generator = torch.Generator().manual_seed(1)
-        noise, material, text = prior.picture_losses(state.network, vocabulary, batch, alpha_bar, generator)
+        noise, material = prior.picture_losses(state.network, vocabulary, batch, alpha_bar, generator)
+        text = prior.reader_loss(state.network, vocabulary, captions, generator)
         (noise + material + text).backward()
         state.update(2e-3)
         losses.append([float(noise.detach()), float(material.detach()), float(text.detach())])

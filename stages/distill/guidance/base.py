@@ -30,13 +30,15 @@ class Response:
     gradient: (P L, 3) of its loss, scaled to a mean over pixels. loss: a number for the curve. curvature: (P L, 3) second
     derivative of the loss by each value, scaled alike, where the loss is one of least squares: the material is then
     stepped by `stages.distill.gauss_newton`. plain: with a curvature, how far a step takes metallic down and roughness up
-    where the pictures leave them open.
+    where the pictures leave them open. expected: (P, 5) sRGB albedo, roughness and metallic that the words alone call for at
+    each point, on average.
     """
 
     gradient: Tensor
     loss: float
     curvature: Tensor | None = None
     plain: float = 0.0
+    expected: Tensor | None = None
 
 
 class Guidance(Protocol):

@@ -2,7 +2,7 @@
 
 Rendered crops and their light maps are exposed alike, put through the model's tone curve, and noised to a random
 diffusion time; the score moves the picture. All three branches (prompt, no prompt, negative prompt) get the same
-conditions, or colours shift.
+conditions, or colours shift. What the words alone call for, at every height of the object, comes along.
 """
 
 from typing import Any
@@ -22,6 +22,9 @@ from stages.prior.text import TextEmbedding
 
 BUDGET = Budget(steps=1500, learning_rate=0.01)
 
+LEVELS = 33
+"""Heights at which the words' expectation is worked out."""
+
 OWN = Weights(eta1=2.5, eta2=(0.0, 0.0), posterior=0.5)
 """What `--loss csd` means for this model."""
 
@@ -37,8 +40,9 @@ class PriorGuidance:
         self._prior, self._options = prior, options
         self._positive = {words: prior.embed([f"{options.prompt}, {words}"]) for words in VIEW_WORDS}
         self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
-        expected = prior.expected_material([options.prompt])[0]
-        self.start: Tensor | None = torch.cat([srgb_decode(expected[:3]), expected[3:]])
+        self._expected = prior.expected_material([options.prompt], torch.linspace(-0.5, 0.5, LEVELS))[0]
+        mean = self._expected.mean(0)
+        self.start: Tensor | None = torch.cat([srgb_decode(mean[:3]), mean[3:]])
 
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """See `Guidance.respond`; the number for the curve is the root mean square of the score on the picture."""
@@ -56,16 +60,18 @@ class PriorGuidance:
         score = distillation_score(predict, picture.detach(), prior.alpha_bar, self.weights, progress, generator)
         (gradient,) = torch.autograd.grad(picture, leaf, score / len(radiance))
         on_object = images.paint(torch.ones_like(radiance[:, :1]))
-        return Response(gradient, float((score * on_object).square().mean().sqrt()))
+        level = ((sample.points[:, 2] + 0.5) * (LEVELS - 1)).round().long().clamp(0, LEVELS - 1)
+        return Response(gradient, float((score * on_object).square().mean().sqrt()), expected=self._expected[level])
 
     def _conditions(self, images: Images, sample: Sample) -> tuple[Tensor, Tensor]:
-        """Exposure (B, 1, 1, 1) and condition channels (B, 22, S, S)."""
+        """Exposure (B, 1, 1, 1) and condition channels (B, 23, S, S)."""
         ones = torch.ones(len(sample.points), 1, device=sample.points.device)
         mask = images.paint(ones)
         lights = images.paint(light_maps(sample.transport).float().flatten(1))
         exposure = self._prior.exposure(lights, mask)
         depth, normal = images.paint(images.surface.depth[:, None]), images.paint(images.surface.view_normals)
-        return exposure, self._prior.prepare(depth, normal, mask, exposure * lights)
+        height = images.paint(sample.points[:, 2:])
+        return exposure, self._prior.prepare(depth, normal, height, mask, exposure * lights)
 
     def _text(self, images: Images, branches: int) -> TextEmbedding:
         """Prompt with view words, no prompt, and negative prompt, for B images each; the first `branches` of them."""

@@ -83,6 +83,6 @@ def _target_radiance(sampler: PixelSampler, truth: Tensor) -> Tensor:
     parts = []
     for rows in torch.arange(len(truth)).split(CHUNK):
         sample, material = sampler.at(rows), truth[rows].to(sampler.device)
-        radiance = shade(sample.transport, Material(material[:, :3], material[:, 3], material[:, 4]))
+        radiance = shade(sample.transport, Material.of(material))
         parts.append(radiance.view(-1, sample.lights, 3).cpu())
     return torch.cat(parts)

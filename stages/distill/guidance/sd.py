@@ -4,8 +4,9 @@ The rendered view, Filmic on white, is encoded; its latents are noised to a rand
 goes back through the encoder to the pixels. All three branches (prompt, no prompt, negative prompt) get the same
 conditions, or colours shift.
 
-The light maps are those of `core.shading`: glTF's dielectric (F0 = 0.04) and direct light. The ControlNet has seen Blender's,
-with F0 = 0.08, Burley's diffuse lobe and one bounce.
+Light maps and normals are those of the conditions' profile: with `conditions --profile sd` what the released ControlNet has
+seen, Blender's light with a bounce (`stages.light.bounce`) and smooth normals; else glTF's direct light, as
+`dreammat train pictures` renders it.
 """
 
 from typing import Any
@@ -75,8 +76,12 @@ class StableDiffusionGuidance:
         """Condition channels (B, 22, S, S), what is not given 0; None without any, for the base alone."""
         if self._given == "none":
             return None
-        depth, normal = images.paint(images.surface.depth[:, None]), images.paint(images.surface.view_normals)
-        lights = images.paint(light_maps(sample.transport.to(torch.float32)).flatten(1))
+        if images.maps is None:
+            normal, lights = images.surface.view_normals, light_maps(sample.transport.to(torch.float32))
+        else:
+            normal, lights = images.maps
+        shown = (images.paint(values) for values in (images.surface.depth[:, None], normal, lights.flatten(1)))
+        depth, normal, lights = shown
         conditions = profile.prepare(depth, normal, mask, lights)
         return profile.without(conditions, geometry=self._given == "light", light=self._given == "geometry")
 

@@ -1,0 +1,94 @@
+"""What the light transport sums over the rays of a point, and the lobes that those rays are drawn from.
+
+`GLTF` is what the pipeline shades with: E, and A and B at every knot (`stages.light.transport`). `BLENDER` is what the
+released ControlNet was shown: the six light maps of `stages.light.blender`.
+"""
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from stages.core.albedo import cosines, diffuse_table, specular_albedo
+from stages.core.brdf import alpha_from_roughness
+from stages.core.shading import KNOTS, LIGHT_MAPS
+from stages.light import blender
+
+
+@dataclass(frozen=True)
+class Terms:
+    """A set of sums: a diffuse one, then two for each glossy lobe, all the first ones before all the second.
+
+    roughness: of the glossy lobes. shares: of the lobe rays, the cosine lobe's, then each glossy one's. stored: sums that a
+    point keeps, `mirror` among them, the two of roughness 0, which are looked up and not summed. judged: by which noise is
+    judged, what a picture of a rough thing is made of. sharp: those that are left as traced, for they show edges that no
+    neighbour knows of. principled: False for glTF's, or weights of Burley's departure from Lambert and of the dielectric's
+    reflection.
+    """
+
+    roughness: tuple[float, ...]
+    shares: tuple[float, ...]
+    stored: int
+    mirror: tuple[int, int]
+    judged: tuple[int, ...]
+    sharp: tuple[int, ...]
+    principled: tuple[bool, float, float] = (False, 0.0, 0.0)
+
+    @property
+    def summed(self) -> NDArray[np.int64]:
+        """Which of the stored sums are summed, in the order of the kernels."""
+        return np.array([j for j in range(self.stored) if j not in self.mirror])
+
+    @property
+    def alphas(self) -> NDArray[np.float32]:
+        """Of the glossy lobes."""
+        return np.array([alpha_from_roughness(r) for r in self.roughness], np.float32)
+
+    def counts(self, total: int) -> NDArray[np.int64]:
+        """Rays of the cosine lobe and of each glossy one: an even number, for two halves, and not 0."""
+        return 2 * np.maximum(1, np.round(np.array(self.shares) * total / 2)).astype(np.int64)
+
+    @functools.lru_cache(maxsize=4)  # noqa: B019  (a handful of sets, which live as long as the process)
+    def albedo(self) -> NDArray[np.float32]:
+        """Open-point albedo of each summed one: (COSINE_STEPS, summed) float32."""
+        on, departure, reflection = self.principled
+        if on:
+            found = blender.open_albedo(cosines(), np.array(self.roughness), departure, reflection, 128)
+            return found.astype(np.float32)
+        cosine = torch.from_numpy(cosines().astype(np.float32))
+        knots = [specular_albedo(torch.full_like(cosine, roughness), cosine).numpy() for roughness in self.roughness]
+        return np.stack([diffuse_table(), *(k[:, 0] for k in knots), *(k[:, 1] for k in knots)], -1)
+
+    def mirror_weights(self, cosine: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
+        """Of what a mirror shows at N·V = cosine, in the two sums of roughness 0."""
+        on, _, reflection = self.principled
+        if on:
+            return np.ones_like(cosine), reflection * blender.mirror_reflectance(cosine)
+        s = (1 - cosine) ** 5
+        return 1 - s, s
+
+
+_K = len(KNOTS)
+
+GLTF = Terms(
+    roughness=KNOTS[1:],
+    shares=(0.22, 0.03, 0.05, 0.08, 0.11, 0.14, 0.14, 0.12, 0.11),
+    stored=2 * _K + 1,
+    mirror=(1, 1 + _K),
+    judged=(0, 1 + KNOTS.index(0.5), 1 + KNOTS.index(1.0)),
+    sharp=(2, 2 + _K),
+)
+"""E, A at every knot, B at every knot."""
+
+BLENDER = Terms(
+    roughness=(0.5, 1.0),
+    shares=(0.4, 0.3, 0.3),
+    stored=len(LIGHT_MAPS) + 1,
+    mirror=(3, 6),
+    judged=(0, 2, 4, 5),
+    sharp=(),
+    principled=(True, 1.0, 1.0),
+)
+"""The light maps in the order of `LIGHT_MAPS`, the first one without its reflection, which is the last sum."""

@@ -1,0 +1,122 @@
+"""Colours by name, as sRGB, and words that change one: "dark teal", "reddish brown"."""
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+COMMON = {
+    "white": "#eeeeee", "black": "#1a1a1a", "gray": "#808080", "grey": "#808080", "red": "#c01818",
+    "green": "#1f8a2c", "blue": "#1f45b8", "yellow": "#e8cc18", "orange": "#e87818", "purple": "#7a22a0",
+    "pink": "#ee86ac", "brown": "#6e4424", "beige": "#d8c8a4", "cream": "#f0e6c8", "tan": "#c8a478",
+    "turquoise": "#30c0b8", "cyan": "#20c0d8", "magenta": "#cc20a0", "violet": "#7a38c8", "lime": "#98d820",
+    "olive": "#6c6c20", "navy": "#14204c", "maroon": "#601818", "teal": "#107878", "lavender": "#b8a4dc",
+    "salmon": "#f08a74", "coral": "#f4745c", "mint": "#9ce0b8", "khaki": "#b4a878", "mustard": "#d0a020",
+    "charcoal": "#36383c", "scarlet": "#cc2010", "burgundy": "#5c1024", "indigo": "#342080", "lilac": "#c4a0d0",
+    "peach": "#f8c4a0", "rose": "#e05478", "azure": "#3c98ec", "aqua": "#50d8d0", "emerald green": "#109050",
+    "forest green": "#1c5020", "sky blue": "#80bce8", "royal blue": "#2848c0", "hot pink": "#f0409c",
+    "neon green": "#50f030", "off white": "#e8e4da", "rust colored": "#a04820", "blue-green": "#14807c",
+    "plum": "#6c2858", "fuchsia": "#d82890", "ochre": "#c08428", "sepia": "#6c4c34", "sand colored": "#d4bc90",
+    "wine red": "#641828", "brick red": "#a43c2c", "cobalt blue": "#1440a4", "sea green": "#2c8c64",
+    "apricot": "#f4b484", "cherry red": "#b01028", "blood red": "#7c0a0a", "lemon yellow": "#f0e430",
+    "jet black": "#0e0e0e", "snow white": "#f4f4f4", "slate gray": "#5c6670", "steel blue": "#4c7ca8",
+    "midnight blue": "#141c40", "chocolate brown": "#4c2c1a", "caramel": "#b07434", "copper colored": "#b46c44",
+    "ginger": "#b86424", "periwinkle": "#9098dc", "orchid": "#c86cc4", "aquamarine": "#70d8b8",
+}
+"""The names that people use most."""
+
+RARE = {
+    "tea": "#65ab7c", "saffron": "#feb209", "cinnamon": "#ac4f06", "cocoa": "#875f42", "fern": "#63a950",
+    "sapphire": "#2138ab", "straw": "#fcf679", "hazel": "#8e7618", "canary": "#fdff63", "carmine": "#9d0216",
+    "lipstick": "#d5174e", "ruby": "#ca0147", "petrol": "#005f6a", "viridian": "#1e9167", "heather": "#a484ac",
+    "mango": "#ffa62b", "shamrock": "#01b44c", "heliotrope": "#d94ff5", "iris": "#6258c4", "pear": "#cbf85f",
+    "sandy": "#f1da7a", "banana": "#ffff7e", "tomato": "#ef4026", "buff": "#fef69e", "fawn": "#cfaf7b",
+    "chestnut": "#742802", "cherry": "#cf0234", "midnight": "#03012d", "rouge": "#ab1239", "wheat": "#fbdd7e",
+    "mulberry": "#920a4e", "celadon": "#befdb7", "strawberry": "#fb2943", "adobe": "#bd6c48", "camel": "#c69f59",
+    "coffee": "#a6814c", "ecru": "#feffca", "amber": "#feb308", "russet": "#a13905", "pistachio": "#c0fa8b",
+    "bordeaux": "#7b002c", "ocean": "#017b92", "blush": "#f29e8e", "lemon": "#fdff52", "cerise": "#de0c62",
+    "umber": "#b26400", "aubergine": "#3d0734", "emerald": "#01a049", "tangerine": "#ff9408", "pumpkin": "#e17701",
+    "chocolate": "#3d1c02", "sienna": "#a9561e", "cobalt": "#1e488f", "wine": "#80013f", "grape": "#6c3461",
+    "brick": "#a03623", "sage": "#87ae73", "eggplant": "#380835", "puce": "#a57e52", "greyish": "#a8a495",
+    "sand": "#e2ca76", "ivory": "#ffffcb", "apple green": "#76cd26", "army green": "#4b5d16",
+    "avocado green": "#87a922", "baby blue": "#a2cffe", "baby pink": "#ffb7ce", "banana yellow": "#fafe4b",
+    "blue grey": "#607c8e", "bottle green": "#044a05", "bubblegum pink": "#fe83cc", "burnt orange": "#c04e01",
+    "burnt sienna": "#b04e0f", "burnt umber": "#a0450e", "butter yellow": "#fffd74", "canary yellow": "#fffe40",
+    "candy pink": "#ff63e9", "carnation pink": "#ff7fa7", "cool grey": "#95a3a6", "coral pink": "#ff6163",
+    "cornflower blue": "#5170d7", "cranberry": "#9e003a", "denim blue": "#3b5b92", "dusty rose": "#c0737a",
+    "dusky pink": "#cc7a8b", "duck egg blue": "#c3fbf4", "egg shell": "#fffcc4", "electric blue": "#0652ff",
+    "electric green": "#21fc0d", "electric purple": "#aa23ff", "fire engine red": "#fe0002",
+    "golden yellow": "#fec615", "grass green": "#3f9b0b", "hunter green": "#0b4008", "ice blue": "#d7fffe",
+    "indigo blue": "#3a18b1", "jade green": "#2baf6a", "jungle green": "#048243", "kelly green": "#02ab2e",
+    "lemon green": "#adf802", "lime green": "#89fe05", "moss green": "#658b38", "mustard yellow": "#d2bd0a",
+    "navy blue": "#001146", "neon pink": "#fe019a", "neon blue": "#04d9ff", "neon yellow": "#cfff04",
+    "ocean blue": "#03719c", "olive green": "#677a04", "pea green": "#8eab12", "peacock blue": "#016795",
+    "pine green": "#0a481e", "powder blue": "#b1d1fc", "powder pink": "#ffb2d0", "prussian blue": "#004577",
+    "racing green": "#014600", "raw umber": "#a75e09", "rose pink": "#f7879a", "rust orange": "#c45508",
+    "rust red": "#aa2704", "sage green": "#88b378", "salmon pink": "#fe7b7c", "sandy brown": "#c4a661",
+    "seafoam green": "#7af9ab", "shocking pink": "#fe02a2", "sunflower yellow": "#ffda03", "tomato red": "#ec2d01",
+    "turquoise blue": "#06b1c4", "violet blue": "#510ac9", "warm grey": "#978a84", "watermelon": "#fd4659",
+    "yellow green": "#c0fb2d", "yellow orange": "#fcb001", "blue violet": "#5d06e9", "red violet": "#9e0168",
+    "red orange": "#fd3c06", "orange red": "#fd411e", "green yellow": "#c9ff27", "blue green": "#137e6d",
+    "green blue": "#06b48b", "dusty blue": "#5a86ad", "dusty pink": "#d58a94", "dusty purple": "#825f87",
+    "royal purple": "#4b006e", "steel grey": "#6f828a", "slate green": "#658d6d", "slate blue": "#5b7c99",
+    "tea green": "#bdf8a3", "tan brown": "#ab7e4c", "teal blue": "#01889f", "teal green": "#25a36f",
+    "spring green": "#a9f971", "stormy blue": "#507b9c", "burlywood": "#deb887", "cadet blue": "#5f9ea0",
+    "firebrick": "#b22222", "gainsboro": "#dcdcdc", "goldenrod": "#daa520", "honeydew": "#f0fff0",
+    "indian red": "#cd5c5c", "thistle": "#d8bfd8", "dodger blue": "#1e90ff", "medium purple": "#9370db",
+}
+"""Further names; most values are the means of the xkcd colour survey (Munroe 2010, CC0), some those of CSS."""
+
+COLORS = COMMON | RARE
+
+COMMON_SHARE = 0.6
+"""Share of the common names among all that are drawn."""
+
+CHANGES = {
+    # word: (factor of the saturation, of the lightness, share of white mixed in)
+    "dark": (1.0, 0.5, 0.0), "deep": (1.15, 0.7, 0.0), "light": (1.0, 1.0, 0.45), "pale": (0.9, 1.0, 0.65),
+    "pastel": (0.8, 1.0, 0.6), "bright": (1.25, 1.1, 0.05), "vivid": (1.4, 1.05, 0.0), "muted": (0.5, 0.95, 0.0),
+}  # fmt: skip
+"""Words that change any colour."""
+
+LEANINGS = {"reddish": "red", "yellowish": "yellow", "greenish": "green", "bluish": "blue", "purplish": "purple",
+            "pinkish": "pink", "brownish": "brown", "greyish": "grey", "whitish": "white"}  # fmt: skip
+"""Words that let a colour lean towards another."""
+
+LEAN = 0.35
+CHANGED, LEANING = 0.2, 0.08
+"""Shares of the drawn colours that such a word is put before."""
+
+WORDS = (*COLORS, *CHANGES, *LEANINGS)
+"""All that the name of a colour may be made of."""
+
+
+def draw_named(rng: Generator) -> tuple[str, NDArray]:
+    """A colour's name and its sRGB (3,)."""
+    names = list(COMMON if rng.random() < COMMON_SHARE else RARE)
+    name = names[rng.integers(len(names))]
+    kind = 1.0 if " " in name else rng.random()
+    if kind < CHANGED:
+        word = list(CHANGES)[rng.integers(len(CHANGES))]
+    elif kind < CHANGED + LEANING:
+        word = list(LEANINGS)[rng.integers(len(LEANINGS))]
+    else:
+        return name, rgb(COLORS[name])
+    return f"{word} {name}", named(f"{word} {name}")
+
+
+def named(name: str) -> NDArray[np.float64]:
+    """sRGB (3,) of a name as `draw_named` makes them."""
+    if name in COLORS:
+        return rgb(COLORS[name])
+    word, base = name.split(" ", 1)
+    color = rgb(COLORS[base])
+    if word in LEANINGS:
+        return color + LEAN * (rgb(COLORS[LEANINGS[word]]) - color)
+    saturation, lightness, white = CHANGES[word]
+    color = (color.mean() + saturation * (color - color.mean())) * lightness
+    return (color + white * (1 - color)).clip(0, 1)
+
+
+def rgb(text: str) -> NDArray[np.float64]:
+    """(3,) in [0, 1] of "#rrggbb"."""
+    return np.array([int(text[i : i + 2], 16) for i in (1, 3, 5)]) / 255.0
