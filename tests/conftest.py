@@ -1,7 +1,11 @@
 """Fixtures that every test shares: golden files and the optional real assets."""
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
+
+if "PYTEST_XDIST_WORKER" in os.environ:  # a thread each, or workers wait for each other's cores: twice as long
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 import pytest
