@@ -63,11 +63,27 @@ class Neighbours:
 
 
 def variance(gap: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
-    """Variance of each sum from the difference of its two halves, (P, ...): its own or its block's, the larger one."""
+    """Variance of each sum from the difference of its two halves, (P, ...): its own or its block's, the larger one.
+
+    `gap` may be overwritten.
+    """
     flat = gap.reshape(len(gap), int(np.prod(gap.shape[1:])))
-    result = np.empty_like(flat)
-    _in_parts(lambda start, end: _variance(flat, near.index, start, end, result), -(-len(near.index) // BLOCK), 8)
-    return result.reshape(gap.shape)
+    _in_parts(lambda start, end: _variance(flat, near.index, start, end), -(-len(near.index) // BLOCK), 8)
+    return flat.reshape(gap.shape)
+
+
+Estimate = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""Sums and their variances."""
+
+
+def merge(into: Estimate, rows: NDArray[np.int64], more: Estimate, share: NDArray[np.float32]) -> None:
+    """Average an independent estimate of some points into theirs, in place. Args: share: (rows,) weight of the new one."""
+    mean, noise, new_mean, new_noise = (a.reshape(len(a), -1) for a in (*into, *more))
+
+    def part(start: int, end: int) -> None:
+        _merge(mean, noise, rows, new_mean, new_noise, share, start, end)
+
+    _in_parts(part, len(rows), POINTS_PER_TASK)
 
 
 def smoothed(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
@@ -102,7 +118,16 @@ def _in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
 
 
 @fast
-def _variance(gap, index, first, end, result):  # type: ignore[no-untyped-def]
+def _merge(mean, noise, rows, new_mean, new_noise, share, start, end):  # type: ignore[no-untyped-def]
+    for i in range(start, end):
+        p, w = rows[i], share[i]
+        for k in range(mean.shape[1]):
+            mean[p, k] += w * (new_mean[i, k] - mean[p, k])
+            noise[p, k] = (np.float32(1) - w) ** 2 * noise[p, k] + w * w * new_noise[i, k]
+
+
+@fast
+def _variance(gap, index, first, end):  # type: ignore[no-untyped-def]
     """`variance` of the blocks in some rows of blocks."""
     height, width = index.shape
     size = gap.shape[1]
@@ -126,7 +151,7 @@ def _variance(gap, index, first, end, result):  # type: ignore[no-untyped-def]
                     q = index[y, x]
                     if q >= 0:
                         for k in range(size):
-                            result[q, k] = np.float32(0.25) * max(gap[q, k] * gap[q, k], total[k] * share)
+                            gap[q, k] = np.float32(0.25) * max(gap[q, k] * gap[q, k], total[k] * share)
 
 
 @fast

@@ -164,9 +164,7 @@ def smoothed(sums: Sums, near: reconstruction.Neighbours, terms: Terms = GLTF) -
 
 def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
     """Average further rays into some points, in place; `more` holds `factor` times the rays that any point began with."""
-    new = (factor / (sums.rays[rows] + factor))[:, None, None]
-    sums.mean[rows] += new * (more.mean - sums.mean[rows])
-    sums.variance[rows] = (1 - new) ** 2 * sums.variance[rows] + new**2 * more.variance
+    reconstruction.merge((sums.mean, sums.variance), rows, (more.mean, more.variance), factor / (sums.rays[rows] + factor))
     sums.rays[rows] += factor
 
 

@@ -116,7 +116,8 @@ def report_conditions(prep: Path, out: Path, options: ReportOptions, progress: P
     if others:
         progress("other renderers", 0, 1)
         job = renderers.Job(subject.scene, subject.c2w, subject.fov_y, options.size, subject.lights.environments)
-        made = [render for name, python in others for render in renderers.measure(name, python, job, subject.points.mask)]
+        ours = {r.environment: (r.seconds, r.rmse_percent) for r in rows if (r.setting, r.map) == ("standard", renderers.MAP)}
+        made = [r for name, python in others for r in renderers.measure(name, python, job, subject.points.mask, ours)]
         write_csv(out / "renderers.csv", made)
         progress("other renderers", 1, 1)
     return rows

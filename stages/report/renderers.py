@@ -33,12 +33,16 @@ NEEDS = {
 MAPS = 6
 """Light maps of one environment, each a rendering of its own there."""
 
+MAP = "m0_r0.5"
+"""The one that is rendered."""
+
 
 @dataclass(frozen=True)
 class Render:
     """One timed rendering of the white dielectric of roughness 0.5. Errors in percent, tone-mapped, over the object.
 
-    all_maps_seconds: of the six light maps of every environment, at this many samples.
+    all_maps_seconds: of the six light maps of every environment, at this many samples. times_as_long: as dreammat, for all
+    of them, with as many samples as the error of our same map takes: error falls with the root of the samples.
     """
 
     renderer: str
@@ -48,6 +52,7 @@ class Render:
     all_maps_seconds: float
     rmse_percent: float
     p999_percent: float
+    times_as_long: float
 
 
 @dataclass(frozen=True)
@@ -61,9 +66,13 @@ class Job:
     environments: tuple
 
 
-def measure(renderer: str, python: str, job: Job, mask: np.ndarray) -> list[Render]:
-    """Render every environment with the given interpreter. Args: renderer: one of NEEDS.
+def measure(
+    renderer: str, python: str, job: Job, mask: np.ndarray, ours: dict[str, tuple[float, float]]
+) -> list[Render]:
+    """Render every environment with the given interpreter.
 
+    Args:
+        renderer: one of NEEDS. ours: of each environment, our seconds for all maps and the RMSE of MAP, percent.
     Raises: InputError when the interpreter or the renderer fails.
     """
     from stages.core.color import reinhard  # not to be had where this file runs as a script
@@ -86,7 +95,9 @@ def measure(renderer: str, python: str, job: Job, mask: np.ndarray) -> list[Rend
                 off = np.abs(tone[samples] - tone[CONVERGED])
                 rmse, p999 = float(np.sqrt(np.square(off).mean())), float(np.quantile(off, 0.999))
                 everything = seconds[samples] * MAPS * len(job.environments)
-                row = (samples, seconds[samples], everything, rmse * 100, p999 * 100)
+                own_seconds, own_rmse = ours[environment.name]
+                ratio = everything / own_seconds * (rmse * 100 / own_rmse) ** 2
+                row = (samples, seconds[samples], everything, rmse * 100, p999 * 100, ratio)
                 renders.append(Render(renderer, environment.name, *row))
     return renders
 
