@@ -67,7 +67,7 @@ def variance(gap: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
 
     `gap` may be overwritten.
     """
-    flat = gap.reshape(len(gap), int(np.prod(gap.shape[1:])))
+    flat = _rows(gap)
     _in_parts(lambda start, end: _variance(flat, near.index, start, end), -(-len(near.index) // BLOCK), 8)
     return flat.reshape(gap.shape)
 
@@ -78,7 +78,7 @@ Estimate = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 def merge(into: Estimate, rows: NDArray[np.int64], more: Estimate, share: NDArray[np.float32]) -> None:
     """Average an independent estimate of some points into theirs, in place. Args: share: (rows,) weight of the new one."""
-    mean, noise, new_mean, new_noise = (a.reshape(len(a), -1) for a in (*into, *more))
+    mean, noise, new_mean, new_noise = map(_rows, (*into, *more))
 
     def part(start: int, end: int) -> None:
         _merge(mean, noise, rows, new_mean, new_noise, share, start, end)
@@ -104,12 +104,16 @@ def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighb
 
 def _weighted(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, power: int) -> NDArray[np.float32]:
     """Over each point's neighbours, (P, values): the weighted mean of the sums, power 1, or that mean's variance, power 2."""
-    width = int(np.prod(mean.shape[1:]))
-    flat, noise = (np.ascontiguousarray(a.reshape(len(mean), width)) for a in (mean, noise))
+    flat, noise = (np.ascontiguousarray(_rows(a)) for a in (mean, noise))
     values, result = flat if power == 1 else noise, np.empty_like(flat)
     geometry = (near.index, near.pixel, near.n, near.point)
     _in_parts(lambda a, b: _average(flat, noise, values, power, *geometry, a, b, result), len(mean), POINTS_PER_TASK)
     return result
+
+
+def _rows(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(P, ...) as (P, values), also where P is 0."""
+    return values.reshape(len(values), int(np.prod(values.shape[1:])))
 
 
 def _in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
