@@ -74,7 +74,7 @@ _K = len(KNOTS)
 
 GLTF = Terms(
     roughness=KNOTS[1:],
-    shares=(0.22, 0.03, 0.05, 0.08, 0.11, 0.14, 0.14, 0.12, 0.11),
+    shares=(0.16, 0.05, 0.05, 0.05, 0.11, 0.16, 0.16, 0.16, 0.1),
     stored=2 * _K + 1,
     mirror=(1, 1 + _K),
     judged=(0, 1 + KNOTS.index(0.5), 1 + KNOTS.index(1.0)),

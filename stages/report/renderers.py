@@ -25,7 +25,7 @@ BATCH = 256
 """Samples a pixel of one pass, which bounds memory."""
 
 NEEDS = {
-    "mitsuba": "the package mitsuba and LLVM 15 or newer (DRJIT_LIBLLVM_PATH names its library)",
+    "mitsuba": "the packages mitsuba and numpy and LLVM 15 or newer (DRJIT_LIBLLVM_PATH names its library)",
     "cycles": "the package bpy, 4.2 or newer",
 }
 """What each renderer's environment must have."""
@@ -87,7 +87,8 @@ def measure(
             try:
                 subprocess.run([python, __file__, renderer, str(given), str(made)], check=True, capture_output=True)
             except (OSError, subprocess.CalledProcessError) as error:
-                raise InputError(f"{python}: {error}; expected a Python with {NEEDS[renderer]}") from error
+                said = (getattr(error, "stderr", None) or str(error).encode()).decode(errors="replace").strip()
+                raise InputError(f"{python}: {said.splitlines()[-1]}; expected a Python with {NEEDS[renderer]}") from error
             result = read_arrays(made)
             tone = {samples: reinhard(result[str(samples)][mask]) for samples in (*SAMPLES, CONVERGED)}
             seconds = dict(zip(SAMPLES, result["seconds"].tolist(), strict=True))
