@@ -109,7 +109,7 @@ bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light 
 
 # other renderers, each in a virtual environment of its own; an empty file where it cannot be had or does not run
 $(MITSUBA): | $(VENV)/.ready
-	@$(PYTHON) -m venv $(VENV)/mitsuba && $(VENV)/mitsuba/bin/python -m pip install --quiet mitsuba && \
+	@$(PYTHON) -m venv $(VENV)/mitsuba && $(VENV)/mitsuba/bin/python -m pip install --quiet mitsuba numpy && \
 	$(VENV)/mitsuba/bin/python -c 'import mitsuba; mitsuba.set_variant("llvm_ad_rgb"); print(mitsuba.Float(1) + 1)' >/dev/null && \
 	echo --mitsuba $(VENV)/mitsuba/bin/python > $@ || { echo "mitsuba does not run here: no side-by-side with it"; : > $@; }
 

@@ -51,7 +51,7 @@ def weight(name: str, text: str) -> Any:
 @click.option("--eta2", type=(UNIT, UNIT), default=DEFAULT["eta2"], show_default=True, metavar="START END",
               help="Of the negative one, at the first step and from two thirds of the steps on; likewise.")
 @weight("posterior", "Share of the posterior-mean term, 0 in the paper's pure classifier score; likewise.")
-@weight("anchor", "Weight of the distance between the mean material and what the words alone call for.")
+@weight("anchor", "Weight of the squared distance from what the words alone call for.")
 @weight("bimodal", "How strongly metallic is sent to 0 or 1 towards the end.")
 @click.option("--given", type=click.Choice(GIVEN), default=DEFAULT["given"], show_default=True,
               help="Conditions the model gets: the paper's ablations.")

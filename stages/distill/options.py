@@ -29,7 +29,7 @@ class DistillOptions:
     eta1: float | None = None  # weight of the positive prediction, Eq. 7; None: what loss and guidance call for
     eta2: tuple[float, float] | None = None  # of the negative one, at the start and from two thirds on; None: likewise
     posterior: float | None = None  # share of (eps_pos - noise) added to the classifier score; None: likewise
-    anchor: float = 0.5  # weight of the distance between the mean material at a height and what the words alone call for
+    anchor: float = 0.5  # weight of the squared distance from what the words alone call for
     given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
     lights: str = "all"  # environments that steps are lit by: "all", or "one", the first
     bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end

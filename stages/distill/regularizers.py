@@ -10,10 +10,6 @@ REACH = 0.05
 """Standard deviation of the smoothness loss's displacement, world units. Source: Zhang et al. 2024, DreamMat, Section 3.3."""
 
 
-BANDS = 8
-"""Bands of height in which a material's mean is compared with an expected one."""
-
-
 def displaced(points: Tensor, normals: Tensor, generator: torch.Generator) -> Tensor:
     """Points moved along the surface's tangent plane by a normal distance. Args: (P, 3) each. Returns: (P, 3)."""
     step = REACH * torch.randn(points.shape, generator=generator).to(points)
@@ -32,16 +28,15 @@ def bimodality(metallic: Tensor) -> Tensor:
     return (metallic * (1 - metallic)).mean()
 
 
-def distance_of_means(material: Material, height: Tensor, expected: Tensor) -> Tensor:
-    """Squared distance between mean and mean expected material within bands of height. Differentiable in: material.
+def encoded(values: Tensor) -> Tensor:
+    """Materials (P, 5) with their albedo as sRGB, in which dark colours count. Differentiable in: values."""
+    return torch.cat([srgb_encode(values[:, :3]), values[:, 3:]], 1)
 
-    The means alone are held, so that a pattern may still vary from place to place.
+
+def distance(material: Material, expected: Tensor) -> Tensor:
+    """Squared distance from an expected material, mean over points. Differentiable in: material.
 
     Args:
-        height: (P,) over the object's middle, object sizes. expected: (P, 5) sRGB albedo, roughness, metallic.
+        expected: (P, 5) sRGB albedo, roughness, metallic.
     """
-    values = torch.cat([srgb_encode(material.albedo), material.roughness[:, None], material.metallic[:, None]], 1)
-    band = ((height + 0.5) * BANDS).long().clamp(0, BANDS - 1)
-    count = torch.bincount(band, minlength=BANDS)
-    sums = torch.zeros(BANDS, values.shape[1], device=values.device).index_add(0, band, values - expected)
-    return (sums.square().sum(1) / count.clamp(min=1)).sum() / len(values)  # means, by each band's share
+    return (encoded(material.columns()) - expected).square().sum(1).mean()

@@ -167,7 +167,7 @@ class PixelSampler:
         eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
         self.eyes = torch.from_numpy(eyes.astype(np.float32))
         self._lights = _pooled_lights(views, rows)  # (M, L, WIDTH)
-        self._chance = _even_chance(self.points, CELL * views.pixel_size())  # (M,)
+        self._chance = even_chance(self.points, CELL * views.pixel_size())  # (M,)
 
     def draw(self, generator: torch.Generator) -> Sample:
         u = torch.rand(self._count, generator=generator, dtype=torch.float64)
@@ -185,7 +185,7 @@ class PixelSampler:
         """Nothing to do: the pool is in memory."""
 
 
-def _even_chance(points: Tensor, cell: float) -> Tensor:
+def even_chance(points: Tensor, cell: float) -> Tensor:
     """Cumulative chance (M,) of points (M, 3) that makes every occupied cell of a grid as likely as the next."""
     index = (points / cell).floor().long() + (1 << 20)
     key = (index[:, 0] << 42) + (index[:, 1] << 21) + index[:, 2]

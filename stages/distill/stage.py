@@ -28,6 +28,7 @@ from stages.distill.optimizer import RowAdam
 from stages.distill.options import DistillOptions
 from stages.distill.preview import write_preview
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
+from stages.distill.start import Start, fit
 from stages.distill.views import Views
 
 SEEN_BY = 3
@@ -85,8 +86,10 @@ def distill(
         checkpoint.checkpoint_path(out).unlink(missing_ok=True)
         return DistillResult(budget.steps, 0, math.nan, True)
     with run_log(out) as log:
-        state = new_state(options, views, device, guidance.start)
+        state = new_state(options, views, device)
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
+        if not resumed and guidance.start is not None:
+            fit(state.field, guidance.start, views, step_generator(options.seed, POOL), progress)
         clock = Clock(state.seconds[-1] if resumed else 0.0)
         run = Run(out, views, guidance, options, budget, request, state, clock)
         _all_steps(run, progress)
@@ -119,7 +122,9 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
     from stages.prior.model import load_prior
 
     model = load_prior(device)
-    return prior.PriorGuidance(model, CropSampler(views, model.size, options.batch, device, options.lights), options)
+    sampler = CropSampler(views, model.size, options.batch, device, options.lights)
+    recipe = model.read([options.prompt]).recipe(0, np.random.default_rng(options.seed))
+    return prior.PriorGuidance(model, sampler, options, Start(recipe, views, step_generator(options.seed, POOL)))
 
 
 def _stable_diffusion(options: DistillOptions, views: Views, device: torch.device) -> Guidance:
@@ -132,12 +137,10 @@ def _stable_diffusion(options: DistillOptions, views: Views, device: torch.devic
     return sd.StableDiffusionGuidance(model, sampler, options)
 
 
-def new_state(options: DistillOptions, views: Views, device: torch.device, start: Tensor | None) -> State:
+def new_state(options: DistillOptions, views: Views, device: torch.device) -> State:
     """Field and optimiser before the first step; the finest cells are as far apart as the surface points that all views see."""
     spacing = views.pixel_size() / math.sqrt(max(1.0, len(views.seen) / SEEN_BY))
     field = MaterialField(FieldConfig.for_detail(spacing), torch.Generator().manual_seed(options.seed)).to(device)
-    if start is not None:
-        field.begin_at(start)
     return State(field, RowAdam(dict(field.named_parameters()), tables=frozenset({"table"})))
 
 
@@ -222,7 +225,7 @@ def _regularizers(material: Material, nearby: Material | None, sample: Sample, r
     losses = []
     if expected is not None:  # words decide what a picture leaves open; a known target needs no such help
         losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(material.metallic))
-        losses.append(options.anchor * regularizers.distance_of_means(material, sample.points[:, 2], expected))
+        losses.append(options.anchor * regularizers.distance(material, expected))
     if nearby is not None:
         losses.append(options.smoothness * regularizers.smoothness(material, nearby))
     return losses

@@ -15,6 +15,7 @@ import math
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 from stages.core.brdf import compiled, sample_cosine, sample_vndf, smith_lambda
 
@@ -82,3 +83,26 @@ def open_albedo(cosines, roughness, departure, reflection, resolution):  # type:
 def mirror_reflectance(cosine):  # type: ignore[no-untyped-def]
     """Reflectance of the dielectric at N·V = cosine, an array of any shape."""
     return F0 + (1 - F0) * fresnel(cosine)
+
+
+LEAST_RISE = 0.01
+"""Sine of the angle at which a mirror direction must leave the face, or nine tenths of the viewer's where that is less."""
+
+
+def lifted(n: NDArray[np.float32], ng: NDArray[np.float32], wo: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Normals turned towards the face, just enough that what a mirror shows is not behind it, as Cycles does before shading.
+
+    In the plane of face and normal the viewer stands at an angle a to the face's normal, the normal at b, and the mirror
+    direction at 2 b - a; its height over the face is r cos(2 b - a), where r is the viewer's length in that plane.
+
+    Args:
+        n, ng, wo: (P, 3) shading normal, the face's normal on the viewer's side, direction to the viewer.
+    """
+    aside = n - (n * ng).sum(-1, keepdims=True) * ng
+    length = np.linalg.norm(aside, axis=-1, keepdims=True)
+    aside = aside / np.maximum(length, 1e-20)
+    up, across = (wo * ng).sum(-1, keepdims=True), (wo * aside).sum(-1, keepdims=True)
+    least = np.minimum(0.9 * up, LEAST_RISE)
+    highest = (np.arctan2(across, up) + np.arccos(np.clip(least / np.hypot(across, up), -1, 1))) / 2
+    angle = np.minimum(np.arctan2(length, (n * ng).sum(-1, keepdims=True)), highest)
+    return (np.sin(angle) * aside + np.cos(angle) * ng).astype(np.float32)

@@ -7,6 +7,7 @@ the dielectric is dark and the metal has no diffuse lobe, none is traced.
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import torch
@@ -16,6 +17,7 @@ from torch import Tensor
 from stages.core.frames import tangent_frame
 from stages.core.shading import LIGHT_MAPS
 from stages.light import reconstruction
+from stages.light.blender import lifted
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer, surface_points
 from stages.light.light_set import MAX_LIGHTS, LightSet
@@ -38,6 +40,7 @@ def blender_light_maps(
     scene: Scene, points: GBuffer, environments: list[Environment], quality: Quality, seed: int, terms: Terms = BLENDER
 ) -> list[Tensor]:
     """The six light maps of a view's points under each environment: (P, 6, 3) float32, linear radiance."""
+    points = lifted_points(points)
     near, result = reconstruction.Neighbours.of(points), []
     for first in range(0, len(environments), MAX_LIGHTS):
         some = environments[first : first + MAX_LIGHTS]
@@ -47,6 +50,11 @@ def blender_light_maps(
         maps = torch.from_numpy(light_maps(smoothed(sums, near, terms)))
         result += [maps[..., 3 * e : 3 * e + 3].contiguous() for e in range(len(some))]
     return result
+
+
+def lifted_points(points: GBuffer) -> GBuffer:
+    """The same with normals as Cycles shades with them, see `blender.lifted`."""
+    return replace(points, n=lifted(points.n, points.ng, points.wo))
 
 
 def light_maps(sums: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -99,7 +107,7 @@ def _chunk(
     hit = np.where(hits.mask, np.cumsum(hits.mask) - 1, -1).astype(np.int32)
     count = int(hits.mask.sum())
     pixels = np.arange(8 * -(-count // 8)).reshape(8, -1) < count  # eight rows: neighbours' samples complement each other
-    there = surface_points(scene, hits, directions, pixels)
+    there = lifted_points(surface_points(scene, hits, directions, pixels))
     maps = light_maps(trace(scene, there, lights, THERE, rays.seed + SEED_STEP, terms).mean)
     shown = np.ascontiguousarray(maps[:, terms.summed])
     sampled = (rays.counts, rays.bounds, terms.principled)

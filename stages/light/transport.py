@@ -77,7 +77,7 @@ SEED_STEP = 0x5EED
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
 
-QUALITY = {"draft": Quality(16, 8), "standard": Quality(38, 16), "high": Quality(256, 128)}
+QUALITY = {"draft": Quality(19, 8), "standard": Quality(38, 16), "high": Quality(304, 128)}
 
 AIM = np.array([alpha_from_roughness(r) for r in (0.5, 1.0)], np.float32)
 """Glossy lobes that light rays are aimed for, beside the diffuse one."""

@@ -14,7 +14,7 @@ from stages.core.artifact import Field, Provenance, Schema, load_npz, save_npz, 
 from stages.core.errors import ArtifactError
 from stages.prior import profile
 from stages.prior.network import Denoiser
-from stages.prior.text import WEIGHTS_FOLDER, Reader, TextEmbedding, TextEncoder, Vocabulary
+from stages.prior.text import WEIGHTS_FOLDER, Reader, Reading, TextEmbedding, TextEncoder, Vocabulary
 
 WEIGHTS = Schema("dreammat.prior", 1, {"parameters": Field("f2", ("N",))}, extra=("layout", "training"))
 """All parameters in one row, in the order of `layout`: [name, shape] each. training: what they came from."""
@@ -76,16 +76,11 @@ class Prior:
         with torch.no_grad():
             return self.network.text(vectors.to(self.device), present.to(self.device))
 
-    def expected_material(self, prompts: list[str], heights: Tensor) -> Tensor:
-        """What the words call for at K heights over the object's middle, on average over what they fit.
-
-        Returns:
-            (B, K, 5): sRGB albedo, roughness and metallic.
-        """
+    def read(self, prompts: list[str]) -> Reading:
+        """What the words of B prompts call for."""
         vectors, present = (t.to(self.device) for t in self.vocabulary.encode(prompts))
-        reader = self.network.reader
         with torch.no_grad():
-            return reader.expected(reader.read(vectors, present), heights.to(self.device).expand(len(prompts), -1))
+            return self.network.reader.read(vectors, present)
 
     def no_conditions(self, count: int) -> Tensor:
         """Conditions of which nothing is given, (B, 23, S, S)."""

@@ -12,10 +12,13 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from numpy.random import Generator
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from stages.core.artifact import Field, Schema, load_npz
+from stages.prior.patterns import PATTERNS
+from stages.prior.recipe import LAYOUTS, Recipe, draw_coat, draw_layout
 
 VOCABULARY = Schema(
     "dreammat.vocabulary",
@@ -146,18 +149,6 @@ class TextEmbedding:
         return TextEmbedding(*(torch.cat(parts) for parts in zip(*(e.parts() for e in embeddings), strict=True)))
 
 
-LAYOUTS = ("none", "edges", "top", "spots", "stripes", "patches", "crevices")
-"""Ways to lay a second coat over the first."""
-
-SHARES = torch.tensor([0.0, 0.06, 0.0, 0.21, 0.5, 0.38, 0.26])
-"""Of the surface that the second coat takes up, as the training's materials have it; what lies on top is known by height."""
-
-TOP = LAYOUTS.index("top")
-
-BORDER = 0.05
-"""Width of the border of what lies on top, object sizes; it is taken to be at the object's middle."""
-
-
 class TextEncoder(nn.Module):
     """A transformer over word vectors; the tokens put before them, `roots`, stand for the whole prompt, the empty one too."""
 
@@ -182,14 +173,24 @@ class TextEncoder(nn.Module):
 
 @dataclass(frozen=True)
 class Reading:
-    """What B prompts call for, on average over all that they fit.
+    """What B prompts call for, on average over all that they fit: a base coat, and one that lies on it, if any does.
 
-    coats: (B, 2, 5) in (0, 1), the base's sRGB albedo (3), roughness and metallic, and those of what lies on it, if anything
-    does. layout: (B, LAYOUTS) logits.
+    coats: (B, 2, 5) in (0, 1), sRGB albedo (3), roughness, metallic. spread: (B, 2, 2) in (0, 1), how far a coat's pattern
+    moves sRGB and roughness. pattern: (B, 2, PATTERNS) logits. layout: (B, LAYOUTS) logits.
     """
 
     coats: Tensor
+    spread: Tensor
+    pattern: Tensor
     layout: Tensor
+
+    def recipe(self, index: int, rng: Generator) -> Recipe:
+        """What prompt number `index` most likely calls for; what the words leave open is drawn."""
+        kinds = [list(PATTERNS)[k] for k in self.pattern[index].argmax(1).tolist()]
+        means, spreads = self.coats[index].cpu().numpy(), self.spread[index].cpu().numpy()
+        coats = tuple(draw_coat(rng, *given) for given in zip(means, spreads, kinds, strict=True))
+        layout = LAYOUTS[int(self.layout[index].argmax())]
+        return Recipe(coats[:1]) if layout == "none" else Recipe(coats, draw_layout(rng, layout))
 
 
 class Reader(TextEncoder):
@@ -197,28 +198,15 @@ class Reader(TextEncoder):
 
     def __init__(self, dims: int = 64, width: int = 128) -> None:
         super().__init__(dims, width, roots=3)
-        self.coat = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 5))
-        self.layout = nn.Linear(width, len(LAYOUTS))
+        self.coat = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 7))
+        self.pattern, self.layout = nn.Linear(width, len(PATTERNS)), nn.Linear(width, len(LAYOUTS))
 
     def read(self, vectors: Tensor, present: Tensor) -> Reading:
         """Args: as `Vocabulary.encode` returns them."""
-        roots = self(vectors, present).tokens[:, :3]
-        return Reading(torch.sigmoid(self.coat(roots[:, :2])), self.layout(roots[:, 2]))
-
-    def expected(self, reading: Reading, height: Tensor) -> Tensor:
-        """The mean material at heights over the object's middle: with a border where one lies on top, else alike everywhere.
-
-        Args:
-            height: (B, K), object sizes.
-        Returns:
-            (B, K, 5) in (0, 1): sRGB albedo (3), roughness, metallic.
-        """
-        chance = torch.softmax(reading.layout, 1)
-        everywhere = chance @ SHARES.to(chance)
-        above = (height / BORDER + 0.5).clamp(0, 1)
-        share = everywhere[:, None] + chance[:, TOP, None] * above
-        base, second = reading.coats[:, None].unbind(2)
-        return base + (second - base) * share[..., None]
+        base, second, whole = self(vectors, present).tokens[:, :3].unbind(1)
+        coats = torch.stack([base, second], 1)
+        mean, spread = torch.sigmoid(self.coat(coats)).split([5, 2], -1)
+        return Reading(mean, spread, self.pattern(coats), self.layout(whole))
 
 
 class TextBlock(nn.Module):

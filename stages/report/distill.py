@@ -205,7 +205,7 @@ def networks(device: torch.device) -> tuple[Any, Any, Any]:
 
 
 def _run(views: Views, guidance: StableDiffusionGuidance, options: DistillOptions, device: torch.device) -> Run:
-    state = new_state(options, views, device, None)
+    state = new_state(options, views, device)
     return Run(Path(), views, guidance, options, BUDGET, Provenance({}, 0, {}), state, Clock())
 
 

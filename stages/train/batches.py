@@ -14,9 +14,10 @@ from torch import Tensor
 
 from stages.core.artifact import load_npz
 from stages.core.shading import KNOTS, Material, Transport, light_maps, shade
+from stages.prior.patterns import PATTERNS
 from stages.prior.profile import SIZE, exposure, prepare, profile_tone
-from stages.prior.text import LAYOUTS
-from stages.train.materials import Surface, encoded, random_material, stand_in
+from stages.prior.recipe import LAYOUTS, Surface
+from stages.train.materials import encoded, random_material, stand_in
 from stages.train.render import SHARD
 
 
@@ -79,6 +80,8 @@ class PictureBatches(torch.utils.data.Dataset):
         return assemble(list(captions), torch.from_numpy(np.stack(images)), rng)
 
 
+PATTERN_NAMES = list(PATTERNS)
+
 POINTS = 12
 """Points of a material that stand for it where the reader learns."""
 
@@ -91,11 +94,14 @@ COMPOSED = 0.7
 class CaptionBatch:
     """B captions and what they call for.
 
-    coats: (B, 2, 5), mean material of each coat, 0 where there is no second one. layout: (B,), its number in `LAYOUTS`.
+    coats: (B, 2, 5), mean material of each coat. spread: (B, 2, 2), how far its pattern moves sRGB and roughness. pattern:
+    (B, 2), its number in `PATTERNS`. layout: (B,), its number in `LAYOUTS`. All are 0 for a second coat that is not there.
     """
 
     captions: list[str]
     coats: Tensor
+    spread: Tensor
+    pattern: Tensor
     layout: Tensor
 
 
@@ -107,16 +113,19 @@ class CaptionBatches(torch.utils.data.Dataset):
 
     def __getitem__(self, step: int) -> CaptionBatch:
         rng = default_rng([self.seed, 2, step])
-        coats, layout = np.zeros((self.size, 2, 5), np.float32), np.zeros(self.size, np.int64)
+        coats, spread = np.zeros((self.size, 2, 5), np.float32), np.zeros((self.size, 2, 2), np.float32)
+        pattern, layout = np.zeros((self.size, 2), np.int64), np.zeros(self.size, np.int64)
         captions = []
         for i in range(self.size):
             material, surface = random_material(rng, COMPOSED), stand_in(rng, POINTS)
             captions.append(material.caption)
-            for k, coat in enumerate(material.coats):
+            for k, coat in enumerate(material.recipe.coats):
                 coats[i, k] = encoded(coat.evaluate(surface)).mean(0)
-            if material.layout is not None:
-                layout[i] = LAYOUTS.index(material.layout.kind)
-        return CaptionBatch(captions, *map(torch.from_numpy, (coats, layout)))
+                spread[i, k] = abs((coat.second - coat.color).mean()), coat.roughness_spread
+                pattern[i, k] = PATTERN_NAMES.index(coat.pattern)
+            if material.recipe.layout is not None:
+                layout[i] = LAYOUTS.index(material.recipe.layout.kind)
+        return CaptionBatch(captions, *map(torch.from_numpy, (coats, spread, pattern, layout)))
 
 
 CHANNELS = {"mask": 1, "depth": 1, "normal": 3, "height": 1, "lights": 18, "radiance": 3, "material": 5}
@@ -131,7 +140,7 @@ def picture(tile: Tile, rng: Generator) -> tuple[str, NDArray[np.float32]]:
     """
     transport = random_transport(tile.transport, tile.cosine, rng)
     material = random_material(rng)
-    values = material.evaluate(tile.surface)  # (P, 5)
+    values = material.recipe.evaluate(tile.surface)  # (P, 5)
     parameters = torch.from_numpy(values)
     radiance = shade(transport, Material.of(parameters))
     lights = light_maps(transport).reshape(len(values), 18).numpy()

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stages.light.environment import Environment, directions_of_texels
 from stages.light.lights import disc, panel
-from stages.train.patterns import fbm
+from stages.prior.patterns import fbm
 
 HEIGHT = 128
 """Rows of a training light; 1.4 degrees a texel."""

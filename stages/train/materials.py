@@ -1,8 +1,4 @@
-"""Random materials with captions: every point's albedo, roughness and metallic, and words that say what it is.
-
-A material is a base coat, or two coats and where the second lies: trim on the edges, top and base, spots, stripes,
-patches, crevices. It reads the surface by height, normal, convexity and occlusion, never by UV.
-"""
+"""Random materials with captions: a recipe, and words that say what it is."""
 
 import functools
 from dataclasses import dataclass
@@ -11,87 +7,29 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from stages.core.color import srgb_decode, srgb_encode
+from stages.core.color import srgb_encode
+from stages.prior.patterns import DARK_BELOW, LEVEL, placement
+from stages.prior.recipe import Coat, Recipe, Surface, draw_layout
 from stages.train.captions import Words, caption, pick, pick_weighted
 from stages.train.colors import COLORS, COMMON, draw_named, rgb
-from stages.train.patterns import PATTERNS, fbm, noise, placement
 from stages.train.substances import FINISHES, FINISHES_METAL, METALS, SUBSTANCES, Substance
 
 SHARES = np.cumsum([s.weight for s in SUBSTANCES])[:-1] / sum(s.weight for s in SUBSTANCES)
 """Upper end of each substance's share of [0, 1), but the last's."""
 
-LEVEL_PATTERNS = ("bricks", "strata")
+COARSEST = 0.6
+"""Least frequency of spots and stripes."""
+
 SHARED_FINISH = 0.45
 """Share of coats that a finish word describes."""
 
 
 @dataclass(frozen=True)
-class Surface:
-    """Points of a shape. point, normal: (P, 3) world. convexity: (P,), -1 in a crease to 1 on an edge.
-
-    occlusion: (P,), share of the hemisphere that is blocked.
-    """
-
-    point: NDArray[np.float32]
-    normal: NDArray[np.float32]
-    convexity: NDArray[np.float32]
-    occlusion: NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Coat:
-    """One substance as drawn. color: sRGB (3,) at the pattern's zero; second: sRGB (3,) at its one.
-
-    scale: pattern units per object size. turn, shift: the pattern's placement.
-    """
-
-    words: Words
-    color: NDArray
-    second: NDArray
-    roughness: float
-    roughness_spread: float
-    metallic: float
-    pattern: str
-    scale: float
-    turn: NDArray
-    shift: NDArray
-
-    def evaluate(self, surface: Surface) -> NDArray[np.float32]:
-        """(P, 5): linear albedo (3), roughness, metallic."""
-        p = (surface.point * self.scale) @ self.turn.T + self.shift
-        value = PATTERNS[self.pattern](p)[:, None]
-        color = np.clip(self.color + (self.second - self.color) * value, 0.012, 0.985)
-        roughness = np.clip(self.roughness + self.roughness_spread * value, 0.0, 1.0)
-        metallic = np.full_like(roughness, self.metallic)
-        return np.concatenate([srgb_decode(color), roughness, metallic], 1).astype(np.float32)
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where the second coat lies. kind: one of `KINDS`. amount: share or level, [0, 1]. shift: (3,) of its noise."""
-
-    kind: str
-    amount: float
-    frequency: float
-    axis: NDArray
-    shift: NDArray
-
-
-@dataclass(frozen=True)
 class RandomMaterial:
-    """A caption and the coats behind it."""
+    """A recipe and a caption for it."""
 
     caption: str
-    coats: tuple[Coat, ...]
-    layout: Layout | None
-
-    def evaluate(self, surface: Surface) -> NDArray[np.float32]:
-        """(P, 5): linear albedo (3), roughness, metallic."""
-        base = self.coats[0].evaluate(surface)
-        if self.layout is None:
-            return base
-        cover = coverage(self.layout, surface)[:, None]
-        return base + (self.coats[1].evaluate(surface) - base) * cover
+    recipe: Recipe
 
 
 KINDS = (("edges", 0.18), ("top", 0.32), ("spots", 0.13), ("stripes", 0.13), ("patches", 0.1), ("crevices", 0.14))
@@ -100,13 +38,13 @@ KINDS = (("edges", 0.18), ("top", 0.32), ("spots", 0.13), ("stripes", 0.13), ("p
 
 def random_material(rng: Generator, composed: float = 0.4) -> RandomMaterial:
     """Draw a material. composed: share of materials with two coats."""
-    base = draw_coat(rng, draw_substance(rng))
+    words, base = draw_coat(rng, draw_substance(rng))
     if rng.random() >= composed:
-        return RandomMaterial(caption(rng, base.words, None, None), (base,), None)
+        return RandomMaterial(caption(rng, words, None, None), Recipe((base,)))
     kind = pick_weighted(rng, KINDS)
-    second = draw_coat(rng, second_substance(rng, kind))
-    layout = Layout(kind, rng.uniform(0, 1), rng.uniform(0.6, 1.8), rng.normal(size=3), rng.uniform(0, 32, 3))
-    return RandomMaterial(caption(rng, base.words, second.words, kind), (base, second), layout)
+    second_words, second = draw_coat(rng, second_substance(rng, kind))
+    recipe = Recipe((base, second), draw_layout(rng, kind, COARSEST))
+    return RandomMaterial(caption(rng, words, second_words, kind), recipe)
 
 
 def draw_substance(rng: Generator) -> Substance:
@@ -124,8 +62,8 @@ def second_substance(rng: Generator, kind: str) -> Substance:
     return draw_substance(rng)
 
 
-def draw_coat(rng: Generator, substance: Substance) -> Coat:
-    """Draw a substance's colour, finish and pattern, with the words that tell them."""
+def draw_coat(rng: Generator, substance: Substance) -> tuple[Words, Coat]:
+    """Draw a substance's colour, finish and pattern, and the words that tell them."""
     color, color_word = draw_color(rng, substance)
     roughness = rng.uniform(*substance.roughness)
     pattern, contrast, spread, finish = substance.pattern, substance.contrast, 0.08, ""
@@ -140,13 +78,13 @@ def draw_coat(rng: Generator, substance: Substance) -> Coat:
         finish = condition if not finish else f"{condition} {finish}"
     lightness = contrast * rng.uniform(0.5, 1.2) * (0.35 + 0.65 * float(color.mean()))
     second = color - lightness * 0.5 * (1 + rng.normal(0, 0.12, 3)) * (-1 if rng.random() < 0.15 else 1)
-    if pattern in ("veins", "bricks", "cells"):  # their negative side is the dark one
+    if pattern in DARK_BELOW:
         second = 2 * color - second
-    turn, shift = placement(rng, pattern in LEVEL_PATTERNS)
+    turn, shift = placement(rng, pattern in LEVEL)
     scale = float(np.exp(rng.uniform(np.log(1.5), np.log(6))))
     words = Words(pick(rng, substance.names), color_word, finish, substance.family)
     spread *= rng.uniform(0.2, 1)
-    return Coat(words, color, second, roughness, spread, substance.metallic, pattern, scale, turn, shift)
+    return words, Coat(color, second, roughness, spread, substance.metallic, pattern, scale, turn, shift)
 
 
 WORN = (
@@ -187,31 +125,6 @@ def vary(rng: Generator, color: NDArray, amount: float) -> NDArray:
 def nearest_color(text: str) -> str:
     """The common colour name whose sRGB is nearest to that of "#rrggbb"."""
     return min(COMMON, key=lambda word: float(((rgb(COLORS[word]) - rgb(text)) ** 2).sum()))
-
-
-def coverage(layout: Layout, surface: Surface) -> NDArray[np.float32]:
-    """Share of the second coat at each point, (P,) in [0, 1]; its borders are narrow."""
-    p = surface.point
-    wobble = fbm(p * 5 + layout.shift, 2)
-    if layout.kind == "edges":
-        return ramp(surface.convexity + 0.06 * wobble, 0.22 + 0.15 * layout.amount, 0.06)
-    if layout.kind == "top":
-        return ramp(p[:, 2] + 0.02 * wobble, 0.24 * (layout.amount - 0.5), 0.012)
-    if layout.kind == "spots":
-        return ramp(noise(p * 7 * layout.frequency + layout.shift), 0.2 + 0.25 * layout.amount, 0.06)
-    if layout.kind == "stripes":
-        axis = layout.axis if layout.amount < 0.4 else np.array([0.0, 0, 1])
-        phase = p @ (axis / np.linalg.norm(axis)) * 26 * layout.frequency
-        return ramp(np.sin(phase + layout.shift[0]), 0.0, 0.15)
-    if layout.kind == "patches":
-        return ramp(fbm(p * 2.2 * layout.frequency + layout.shift, 4), 0.25 * layout.amount, 0.06)
-    hidden = np.maximum(surface.occlusion - 0.25, -surface.convexity * 0.9)
-    return ramp(hidden + 0.15 * wobble, 0.12 + 0.1 * layout.amount, 0.08)
-
-
-def ramp(x: NDArray, edge: float, width: float) -> NDArray:
-    """0 below the edge, 1 above, a straight ramp of twice the width between."""
-    return np.clip((x - edge) / (2 * width) + 0.5, 0, 1).astype(np.float32)
 
 
 def stand_in(rng: Generator, count: int) -> Surface:

@@ -65,8 +65,8 @@ NULL_TEXT, NO_GEOMETRY, NO_LIGHT = 0.12, 0.15, 0.15
 WORD_NOISE = 0.06
 """Deviation of the noise on each component of a (unit) word vector, so that neighbours of a word are learnt with it."""
 
-LAYOUT_WEIGHT = 0.02
-"""Of the layout's cross entropy beside the coats' squared errors."""
+KIND_WEIGHT = 0.02
+"""Of the cross entropy of patterns and layout beside the coats' squared errors."""
 
 FREE = ("device", "workers", "checkpoint_every", "sample_every")
 CAPTIONS = 256
@@ -239,13 +239,16 @@ def picture_losses(
 def reader_loss(
     network: PriorNetwork, vocabulary: Vocabulary, batch: CaptionBatch, generator: torch.Generator
 ) -> Tensor:
-    """Error of the coats that captions call for, and of their layout."""
+    """Error of the coats that captions call for, of their patterns, and of their layout."""
     device = next(network.parameters()).device
-    coats, layout = batch.coats.to(device), batch.layout.to(device)
+    layout = batch.layout.to(device)
     reading = network.reader.read(*noisy_words(vocabulary, batch.captions, generator, device))
-    there = torch.stack([torch.ones_like(layout), (layout > 0).long()], 1)[..., None]  # (B, 2, 1)
-    wrong_coats = (there * (reading.coats - coats).square()).mean()
-    return wrong_coats + LAYOUT_WEIGHT * cross_entropy(reading.layout, layout)
+    there = torch.stack([torch.ones_like(layout), (layout > 0).long()], 1).bool()  # (B, 2)
+    wrong_coats = (there[..., None] * (reading.coats - batch.coats.to(device)).square()).mean()
+    wrong_spread = (reading.spread - batch.spread.to(device))[there].square().mean()
+    wrong_pattern = cross_entropy(reading.pattern[there], batch.pattern.to(device)[there])
+    wrong_layout = cross_entropy(reading.layout, layout)
+    return wrong_coats + wrong_spread + KIND_WEIGHT * (wrong_pattern + wrong_layout)
 
 
 def noisy_words(

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from stages.core.artifact import Field, Provenance, Schema, peek, save_npz
+from stages.core.convexity import SurfaceSamples
 from stages.core.frames import look_at, tangent_frame
 from stages.core.progress import Progress
 from stages.core.shading import KNOTS
@@ -79,7 +79,7 @@ def render_shard(index: int, tiles: int, seed: int) -> dict[str, NDArray]:
     while len(done) < tiles:
         shape = make_shape(rng)
         scene = Scene(shape.vertices, shape.triangles, shape.normals)
-        neighbours = SurfaceSamples(shape, rng)
+        neighbours = samples_of(shape, rng)
         for _ in range(2):
             c2w, fov = random_camera(shape, rng)
             view = trace_view(scene, c2w, fov, VIEW, VIEW)
@@ -122,7 +122,7 @@ def cut(view: GBuffer, stride: int, rng: Generator) -> GBuffer:
 
 
 def render_tile(
-    scene: Scene, tile: GBuffer, c2w: NDArray, lights: list, neighbours: "SurfaceSamples", rng: Generator
+    scene: Scene, tile: GBuffer, c2w: NDArray, lights: list, neighbours: SurfaceSamples, rng: Generator
 ) -> dict[str, NDArray]:
     """Arrays of one tile, as the shard's but for `start`."""
     transports = light_transport(scene, tile, lights, TILE_RAYS, int(rng.integers(2**31)))
@@ -160,29 +160,11 @@ def occlusion(scene: Scene, tile: GBuffer, rng: Generator, rays: int = 24) -> ND
     return blocked.reshape(count, rays).mean(1).astype(np.float32)
 
 
-class SurfaceSamples:
-    """Points spread over a shape, to tell edges from creases."""
-
-    def __init__(self, shape: Shape, rng: Generator, count: int = 16000) -> None:
-        a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
-        area = np.linalg.norm(np.cross(b - a, c - a), axis=1).astype(np.float64)
-        pick = rng.choice(len(area), count, p=area / area.sum())
-        u = np.sqrt(rng.random((count, 1)))
-        v = rng.random((count, 1))
-        self.points = (1 - u) * a[pick] + u * (1 - v) * b[pick] + u * v * c[pick]
-        self.tree = cKDTree(self.points)
-
-    def convexity(self, points: NDArray, normals: NDArray, near: int = 24, reach: float = 0.05) -> NDArray[np.float32]:
-        """How far the surface around each point falls off below its tangent plane, against its distance.
-
-        Args:
-            points, normals: (P, 3). near: neighbours looked at. reach: how far away they may be, world units.
-        Returns:
-            (P,): about 0.4 on a right-angled edge, 0 on a plane, negative in a crease.
-        """
-        distance, index = self.tree.query(points, near, distance_upper_bound=reach)
-        found = np.isfinite(distance)
-        offset = self.points[np.where(found, index, 0)] - points[:, None]
-        drop = np.where(found, -(offset * normals[:, None]).sum(-1), 0).sum(1)
-        total = np.where(found, distance, 0).sum(1)
-        return np.where(total > 0, drop / np.maximum(total, 1e-12), 0).astype(np.float32)
+def samples_of(shape: Shape, rng: Generator, count: int = 16000) -> SurfaceSamples:
+    """Points spread over a shape."""
+    a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).astype(np.float64)
+    pick = rng.choice(len(area), count, p=area / area.sum())
+    u = np.sqrt(rng.random((count, 1)))
+    v = rng.random((count, 1))
+    return SurfaceSamples((1 - u) * a[pick] + u * (1 - v) * b[pick] + u * v * c[pick])

@@ -135,6 +135,25 @@ def test_interrupted_run_continues_to_the_same_bytes(prep: Path, made: Path, tmp
     assert fingerprint(out) == fingerprint(made)
 
 
+def test_interrupted_run_with_the_profile_sd_continues_to_the_same_bytes(prep: Path, tmp_path: Path) -> None:
+    """Also where a view lacks its light maps alone."""
+
+    def stop(what: str, done: int, total: int) -> None:
+        if done > 0:
+            raise Stop
+
+    options = dataclasses.replace(SMALL, views=2, env=("studio",), maps=False, profile="sd")
+    whole, stopped = tmp_path / "whole", tmp_path / "stopped"
+    conditions(prep, whole, options)
+    with pytest.raises(Stop):
+        conditions(prep, stopped, options, progress=stop)
+    lost = sorted(stopped.glob("view_*/sd/studio.exr"))
+    assert lost
+    lost[0].unlink()
+    assert conditions(prep, stopped, options).made == 2
+    assert fingerprint(stopped) == fingerprint(whole)
+
+
 def test_other_options_start_afresh(prep: Path, tmp_path: Path) -> None:
     out = tmp_path / "conditions"
     conditions(prep, out, dataclasses.replace(SMALL, views=4))

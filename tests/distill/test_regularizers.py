@@ -2,6 +2,7 @@
 
 import torch
 
+from stages.core.color import srgb_encode
 from stages.core.shading import Material
 from stages.distill import regularizers
 
@@ -31,9 +32,9 @@ def test_bimodality_is_zero_at_both_ends_and_pushes_away_from_the_middle() -> No
     assert gradient[2] > 0 > gradient[3]
 
 
-def test_distance_of_means_lets_points_differ() -> None:
-    spread = Material(torch.tensor([[0.0] * 3, [1.0] * 3]), torch.tensor([0.2, 0.8]), torch.tensor([0.0, 1.0]))
-    level, middle = torch.zeros(2), torch.full((2, 5), 0.5)
-    assert float(regularizers.distance_of_means(spread, level, middle)) < 1e-12
-    assert float(regularizers.distance_of_means(spread, torch.tensor([-0.4, 0.4]), middle)) > 0.5, "two bands"
-    assert float(regularizers.distance_of_means(material(0.25), torch.zeros(5), torch.full((5, 5), 0.5))) > 0.1
+def test_distance_is_squared_and_sees_albedo_as_srgb() -> None:
+    expected = torch.full((5, 5), 0.5)
+    expected[:, :3] = srgb_encode(torch.tensor(0.5))
+    assert float(regularizers.distance(material(0.5), expected)) < 1e-12
+    expected[:, 3] += 0.1
+    torch.testing.assert_close(regularizers.distance(material(0.5), expected), torch.tensor(0.01))

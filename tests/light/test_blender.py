@@ -117,3 +117,32 @@ def test_a_cube_shaded_smooth_has_normals_along_its_diagonals() -> None:
     np.testing.assert_allclose(smooth.normals, diagonal[cube.faces], atol=1e-6)
     both_sides = Scene(cube.vertices[:3], np.array([[0, 1, 2], [0, 2, 1]]), np.zeros((2, 3, 3))).shaded_smooth()
     assert np.linalg.norm(both_sides.normals, axis=-1) == pytest.approx(1)
+
+
+def directions(count: int, up: np.ndarray | None = None) -> np.ndarray:
+    """Random unit vectors, (count, 3) float32; on the side of `up` where given."""
+    found = np.random.default_rng(0 if up is None else 1).normal(size=(count, 3))
+    found /= np.linalg.norm(found, axis=-1, keepdims=True)
+    return (found if up is None else found * np.sign((found * up).sum(-1, keepdims=True))).astype(np.float32)
+
+
+def test_a_lifted_normal_shows_nothing_behind_the_face() -> None:
+    ng = directions(2000)
+    wo = directions(2000, ng)
+    aside = np.random.default_rng(2).normal(size=ng.shape) * np.random.default_rng(3).uniform(0, 1, (2000, 1))
+    n = (ng + aside).astype(np.float32)
+    n *= np.sign((n * ng).sum(-1, keepdims=True)) / np.linalg.norm(n, axis=-1, keepdims=True)
+    found = blender.lifted(n, ng, wo)
+
+    def rise(normal: np.ndarray) -> np.ndarray:
+        """Height over the face of what a mirror shows."""
+        mirror = 2 * (normal * wo).sum(-1, keepdims=True) * normal - wo
+        return (mirror * ng).sum(-1)
+
+    least = np.minimum(0.9 * (wo * ng).sum(-1), blender.LEAST_RISE)
+    fine = rise(n) >= least + 1e-5
+    assert 0.2 < fine.mean() < 0.8
+    np.testing.assert_allclose(found[fine], n[fine], atol=1e-5)  # what is fine stays
+    np.testing.assert_allclose(rise(found)[~fine], least[~fine], atol=1e-4)  # the others turn no further than they must
+    np.testing.assert_allclose(np.linalg.norm(found, axis=-1), 1, atol=1e-5)
+    assert np.abs((np.cross(n, ng) * found).sum(-1)).max() < 1e-5  # within the plane of both

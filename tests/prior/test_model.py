@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from numpy.random import default_rng
 
 from stages.core.artifact import Provenance, sha256_file
 from stages.core.errors import ArtifactError
@@ -50,8 +51,8 @@ def test_noise_prediction_has_not_changed(prior: Prior, golden) -> None:
     noise, conditions = view(3)
     prompts = prior.embed(["polished gold", "red plastic", ""])
     eps = prior.denoise(noise, torch.tensor([100, 400, 800]), conditions, prompts)[0]
-    expected = prior.expected_material(["polished gold", "red plastic", "oak wood"], torch.tensor([-0.3, 0.3]))
-    arrays = {"eps": eps[:, :, ::8, ::8].numpy(), "expected": expected.numpy()}
+    reading = prior.read(["polished gold", "red plastic", "oak wood"])
+    arrays = {"eps": eps[:, :, ::8, ::8].numpy(), "coats": reading.coats.numpy(), "spread": reading.spread.numpy()}
     golden.check("prior/predict_noise", arrays, atol=0.06)  # bfloat16 differs between processors
 
 
@@ -82,13 +83,33 @@ def test_the_prompt_steers_the_prediction(prior: Prior) -> None:
     assert metallic["polished gold"] > 0.6 and metallic["blue fabric"] < 0.4
 
 
-def test_expected_material_separates_what_words_separate(prior: Prior) -> None:
-    gold, steel, red, rubber, chrome = prior.expected_material(
-        ["gold", "brushed steel", "red plastic", "black rubber", "polished chrome"], torch.zeros(1)
-    )[:, 0].unbind()
+def test_words_are_read_as_what_they_name(prior: Prior) -> None:
+    prompts = ["gold", "brushed steel", "red plastic", "black rubber", "polished chrome"]
+    gold, steel, red, rubber, chrome = prior.read(prompts).coats[:, 0].unbind()
     assert min(gold[4], steel[4], chrome[4]) > 0.7 and max(red[4], rubber[4]) < 0.3
     assert gold[2] < gold[0] - 0.15 and red[0] > red[1] + 0.3
     assert rubber[:3].max() < 0.3 and chrome[3] < 0.25 < rubber[3]
+
+
+@pytest.mark.parametrize(
+    "prompt, pattern",
+    [("oak", "grain"), ("mahogany", "grain"), ("white marble", "veins"), ("brick", "bricks"), ("granite", "speckle"),
+     ("brushed steel", "streaks"), ("red plastic", "plain"), ("brown leather", "cells"), ("linen", "weave")],
+)
+def test_words_are_read_as_their_pattern(prior: Prior, prompt: str, pattern: str) -> None:
+    (coat,) = prior.read([prompt]).recipe(0, default_rng(0)).coats
+    assert coat.pattern == pattern
+
+
+@pytest.mark.parametrize(
+    "prompt, kind",
+    [("oak", None), ("marble base and copper top", "top"), ("red plastic with gold trim", "edges"),
+     ("white ceramic with blue spots", "spots"), ("black rubber with yellow stripes", "stripes"),
+     ("stone with moss in the crevices", "crevices"), ("steel with patches of rust", "patches")],
+)
+def test_words_are_read_as_their_layout(prior: Prior, prompt: str, kind: str | None) -> None:
+    layout = prior.read([prompt]).recipe(0, default_rng(0)).layout
+    assert (layout.kind if layout else None) == kind
 
 
 def test_samples_are_finite_and_follow_their_seed(prior: Prior) -> None:

@@ -1,20 +1,12 @@
 import numpy as np
 import pytest
 import torch
+from numpy.random import default_rng
 
 from stages.prior.model import VOCABULARY_FILE
-from stages.prior.text import (
-    LAYOUTS,
-    MAX_WORDS,
-    SHARES,
-    TOP,
-    Reader,
-    Reading,
-    TextEmbedding,
-    TextEncoder,
-    Vocabulary,
-    split_words,
-)
+from stages.prior.patterns import PATTERNS
+from stages.prior.recipe import LAYOUTS
+from stages.prior.text import MAX_WORDS, Reading, TextEmbedding, TextEncoder, Vocabulary, split_words
 
 
 @pytest.fixture(scope="module")
@@ -94,11 +86,21 @@ def test_embeddings_expand_and_join() -> None:
     assert torch.equal(joined.tokens[0], joined.tokens[2])
 
 
-def test_what_lies_on_top_has_a_border_and_what_else_lies_on_a_coat_is_mixed_in_by_its_share() -> None:
-    torch.manual_seed(0)
-    reader = Reader(4, 16)
-    coats = torch.stack([torch.zeros(3, 5), torch.ones(3, 5)], 1)
-    layout = 40 * torch.eye(len(LAYOUTS))[[0, TOP, LAYOUTS.index("spots")]]
-    found = reader.expected(Reading(coats, layout), torch.tensor([[-0.9, -0.03, 0.0, 0.03, 0.4]] * 3))
-    expected = torch.tensor([[0.0, 0, 0, 0, 0], [0, 0, 0.5, 1, 1], [float(SHARES[LAYOUTS.index("spots")])] * 5])
-    torch.testing.assert_close(found, expected[..., None].expand(3, 5, 5), rtol=0, atol=1e-5)
+def reading(layout: str) -> Reading:
+    """Grey stone, and gold on it."""
+    coats = torch.tensor([[[0.5, 0.5, 0.5, 0.7, 0.0], [0.9, 0.8, 0.5, 0.2, 1.0]]])
+    names = list(PATTERNS)
+    pattern = 40 * torch.eye(len(names))[[names.index("blotch"), names.index("smudge")]][None]
+    return Reading(coats, torch.full((1, 2, 2), 0.1), pattern, 40 * torch.eye(len(LAYOUTS))[[LAYOUTS.index(layout)]])
+
+
+def test_a_reading_is_a_recipe_of_the_most_likely() -> None:
+    recipe = reading("spots").recipe(0, default_rng(0))
+    assert [coat.pattern for coat in recipe.coats] == ["blotch", "smudge"] and recipe.layout.kind == "spots"
+    assert [coat.metallic for coat in recipe.coats] == [0.0, 1.0]
+    assert reading("none").recipe(0, default_rng(0)).layout is None
+
+
+def test_a_seed_draws_what_the_words_leave_open() -> None:
+    first, again, other = (reading("none").recipe(0, default_rng(s)).coats[0] for s in (1, 1, 2))
+    assert first.scale == again.scale != other.scale

@@ -45,7 +45,7 @@ def test_report_on_a_tiny_model(tmp_path: Path) -> None:
     assert sum(part.share_percent for part in report.parts) == pytest.approx(100)
     assert all(part.milliseconds > 0 for part in report.parts) and report.step_milliseconds > 0
     counted = {part.part: part for part in report.parts if part.gbyte > 0}
-    assert len(counted) == 6 and all(0 < part.of_peak_percent < 100 for part in counted.values())
+    assert len(counted) == 6 and all(part.of_peak_percent > 0 for part in counted.values())  # in a cache, memory has no peak
     denoise = counted[distill.NAMES["denoise"]]
     assert denoise.gflop > counted[distill.NAMES["field"]].gflop > 0
     with (tmp_path / "out" / "distill.csv").open() as stream:

@@ -22,5 +22,5 @@ def test_arrays_come_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize("python", ("/no/such/python", sys.executable))
 def test_an_interpreter_without_the_renderer_is_named(python: str, renderer: str) -> None:
     job = Job(scenes.sphere(0), np.eye(4), 0.5, 8, (scenes.even_light(),))
-    with pytest.raises(InputError, match=r"expected a Python with the package (mitsuba|bpy)"):
+    with pytest.raises(InputError, match=r"expected a Python with the packages? (mitsuba|bpy)"):
         measure(renderer, python, job, np.ones((8, 8), bool), {})

@@ -44,7 +44,7 @@ def test_tiles_are_point_samples_of_their_view(stride: int) -> None:
 def test_convexity_tells_edges_creases_and_planes() -> None:
     mesh = shapes.Mesh(shapes.cube_sphere(10), shapes.grid_cube(10))
     cube = shapes.finish(shapes.Mesh(mesh.vertices / np.abs(mesh.vertices).max(1, keepdims=True), mesh.triangles), 0.3)
-    samples = render.SurfaceSamples(cube, default_rng(0), count=60000)
+    samples = render.samples_of(cube, default_rng(0), count=60000)
     points = np.array([[0.5, 0.0, 0.0], [0.5, 0.499, 0.0]])
     plane, edge = samples.convexity(points, np.array([[1.0, 0, 0], [1.0, 0, 0]]))
     inside_out = samples.convexity(points[1:], -np.array([[1.0, 0, 0]]))[0]

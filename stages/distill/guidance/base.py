@@ -13,6 +13,7 @@ from torch import Tensor
 
 from stages.distill.guidance.csd import Weights
 from stages.distill.sampling import Sample, Sampler
+from stages.distill.start import Start
 
 
 @dataclass(frozen=True)
@@ -45,8 +46,8 @@ class Guidance(Protocol):
     """What an optimisation step asks.
 
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
-    inputs: role -> SHA-256 of the files it was made from. start: (5,) linear albedo, roughness and metallic from which
-    the field had best begin, or None where it makes no difference. budget: what it calls for where the options leave it
+    inputs: role -> SHA-256 of the files it was made from. start: from which the field had best begin, or
+    None where it makes no difference. budget: what it calls for where the options leave it
     open. weights: of its score, or None where it has none.
     """
 
@@ -54,11 +55,13 @@ class Guidance(Protocol):
     def sampler(self) -> Sampler: ...
 
     @property
+    def start(self) -> Start | None: ...
+
+    @property
     def weights(self) -> Weights | None: ...
 
     identity: dict[str, Any]
     inputs: dict[str, str]
-    start: Tensor | None
     budget: Budget
 
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:

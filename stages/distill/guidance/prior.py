@@ -2,7 +2,7 @@
 
 Rendered crops and their light maps are exposed alike, put through the model's tone curve, and noised to a random
 diffusion time; the score moves the picture. All three branches (prompt, no prompt, negative prompt) get the same
-conditions, or colours shift. What the words alone call for, at every height of the object, comes along.
+conditions, or colours shift. What the words alone call for comes along.
 """
 
 from typing import Any
@@ -10,39 +10,34 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from stages.core.color import srgb_decode
 from stages.core.shading import light_maps
 from stages.distill.guidance.base import Budget, Response
 from stages.distill.guidance.csd import Weights, chosen_weights, distillation_score
 from stages.distill.guidance.view_words import VIEW_WORDS, words_of
 from stages.distill.options import DistillOptions
+from stages.distill.regularizers import encoded
 from stages.distill.sampling import CropSampler, Images, Sample
+from stages.distill.start import Start
 from stages.prior.model import Prior
 from stages.prior.text import TextEmbedding
 
 BUDGET = Budget(steps=1500, learning_rate=0.01)
-
-LEVELS = 33
-"""Heights at which the words' expectation is worked out."""
 
 OWN = Weights(eta1=2.5, eta2=(0.0, 0.0), posterior=0.5)
 """What `--loss csd` means for this model."""
 
 
 class PriorGuidance:
-    """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size."""
+    """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size; start: what the words alone call for."""
 
-    def __init__(self, prior: Prior, sampler: CropSampler, options: DistillOptions) -> None:
-        self.sampler = sampler
+    def __init__(self, prior: Prior, sampler: CropSampler, options: DistillOptions, start: Start) -> None:
+        self.sampler, self.start = sampler, start
         self.identity: dict[str, Any] = prior.identity
         self.inputs = {"prior": prior.identity["weights"]}
         self.budget, self.weights = BUDGET, chosen_weights(options, OWN)
         self._prior, self._options = prior, options
         self._positive = {words: prior.embed([f"{options.prompt}, {words}"]) for words in VIEW_WORDS}
         self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
-        self._expected = prior.expected_material([options.prompt], torch.linspace(-0.5, 0.5, LEVELS))[0]
-        mean = self._expected.mean(0)
-        self.start: Tensor | None = torch.cat([srgb_decode(mean[:3]), mean[3:]])
 
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """See `Guidance.respond`; the number for the curve is the root mean square of the score on the picture."""
@@ -60,8 +55,8 @@ class PriorGuidance:
         score = distillation_score(predict, picture.detach(), prior.alpha_bar, self.weights, progress, generator)
         (gradient,) = torch.autograd.grad(picture, leaf, score / len(radiance))
         on_object = images.paint(torch.ones_like(radiance[:, :1]))
-        level = ((sample.points[:, 2] + 0.5) * (LEVELS - 1)).round().long().clamp(0, LEVELS - 1)
-        return Response(gradient, float((score * on_object).square().mean().sqrt()), expected=self._expected[level])
+        expected = encoded(self.start(sample.points, sample.normals))
+        return Response(gradient, float((score * on_object).square().mean().sqrt()), expected=expected)
 
     def _conditions(self, images: Images, sample: Sample) -> tuple[Tensor, Tensor]:
         """Exposure (B, 1, 1, 1) and condition channels (B, 23, S, S)."""

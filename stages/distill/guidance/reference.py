@@ -56,7 +56,7 @@ class ReferenceGuidance:
         self.sampler = sampler
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
-        self.start: Tensor | None = None
+        self.start = None
         self.budget, self.weights = BUDGET, None
         self._found = torch.from_numpy(found)
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)

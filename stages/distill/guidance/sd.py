@@ -49,7 +49,7 @@ class StableDiffusionGuidance:
         self.sampler = sampler
         self.identity: dict[str, Any] = model.identity
         self.inputs: dict[str, str] = model.hashes
-        self.start: Tensor | None = None
+        self.start = None
         self.budget, self.weights = BUDGET, chosen_weights(options, CSD)
         self._model, self._given = model, options.given
         prompts = [f"{options.prompt}, {words}" for words in VIEW_WORDS]

@@ -1,9 +1,10 @@
 """How a material varies in space: scalar functions of the 3-D point, so that no UV and no seam enters.
 
-Each pattern maps points to values around 0, about -1 ... 1, which `materials.py` turns into colour and roughness. Noise
+Each pattern maps points to values around 0, about -1 ... 1, which `recipe.py` turns into colour and roughness. Noise
 is a fixed lattice of random values, interpolated smoothly and repeated every 32 units.
 """
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -120,6 +121,19 @@ PATTERNS: dict[str, Callable[[NDArray], NDArray]] = {
     f.__name__: f
     for f in (plain, smudge, blotch, speckle, grain, veins, lightveins, strata, bricks, weave, streaks, cells)
 }
+
+
+@functools.cache
+def average(name: str) -> float:
+    """Mean of a pattern."""
+    return float(PATTERNS[name](np.random.default_rng(0).uniform(0, 32, (20_000, 3))).mean())
+
+
+DARK_BELOW = ("veins", "bricks", "cells")
+"""Patterns whose negative side is the dark one."""
+
+LEVEL = ("bricks", "strata")
+"""Patterns whose courses lie level."""
 
 
 def placement(rng: Generator, upright: bool) -> tuple[NDArray, NDArray]:

@@ -1,0 +1,86 @@
+"""Where a distillation begins: what the words alone call for, laid over this very surface.
+
+The diffusion model judges pictures; it does not invent a pattern on a plain grey thing within a few hundred steps. So the
+prompt is read as a recipe first (`stages.prior.recipe`), which says what is patterned how and what lies where, the field is
+fitted to that, and the model goes on from there. Seeds draw other patterns of the same material.
+"""
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from stages.core.convexity import SurfaceSamples
+from stages.core.field import MaterialField
+from stages.core.progress import Progress
+from stages.distill.optimizer import RowAdam
+from stages.distill.regularizers import encoded
+from stages.distill.sampling import even_chance
+from stages.distill.views import Views
+from stages.prior.recipe import Recipe, Surface
+
+SAMPLES = 16_000
+"""Surface points that tell edges from creases."""
+
+RELIEF = 0.07
+"""Share of the surface that counts as its edges, and as its creases, where it has none that are sharp."""
+
+SHARP = 0.3
+"""Convexity of a sharp edge."""
+
+MOST_GAIN = 4.0
+"""How far a rounded edge may be taken for a sharp one."""
+
+STEPS, POINTS, VIEWS = 240, 8192, 4
+"""Of the fit, and what each of its steps looks at."""
+
+LEARNING_RATE = 0.02
+
+
+class Start:
+    """A recipe on the surface that some views show."""
+
+    def __init__(self, recipe: Recipe, views: Views, generator: torch.Generator) -> None:
+        self._recipe = recipe
+        surface = random_points(views, views.seen, 8 * SAMPLES, generator)
+        chance = even_chance(surface[0], 4 * views.pixel_size())
+        u = torch.rand(SAMPLES, generator=generator, dtype=torch.float64)
+        chosen = torch.searchsorted(chance, u).clamp(max=len(chance) - 1)
+        points, normals = (t[chosen].numpy() for t in surface)
+        self._samples = SurfaceSamples(points)
+        low, high = np.quantile(self._samples.convexity(points, normals), (RELIEF, 1 - RELIEF))
+        self._gain = tuple(float(np.clip(SHARP / max(x, 1e-6), 1, MOST_GAIN)) for x in (-low, high))
+
+    def __call__(self, points: Tensor, normals: Tensor) -> Tensor:
+        """(P, 5) linear albedo, roughness and metallic of points with normals, (P, 3) each, world."""
+        point, normal = points.cpu().numpy(), normals.cpu().numpy()
+        layout, convexity = self._recipe.layout, np.zeros(len(point), np.float32)
+        if layout is not None and layout.kind in ("edges", "crevices"):
+            convexity = self._samples.convexity(point, normal)
+            convexity *= np.where(convexity < 0, *self._gain)
+        surface = Surface(point, normal, convexity, np.zeros_like(convexity))
+        return torch.from_numpy(self._recipe.evaluate(surface)).to(points.device)
+
+
+def random_points(views: Views, chosen: list[int], count: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+    """Points and normals of about `count` random pixels of the chosen views, (P, 3) each."""
+    share = -(-count // len(chosen))
+    rows = [torch.randint(len(views.pixels(view)), (share,), generator=generator).numpy() for view in chosen]
+    surfaces = [views.surface(view, r) for view, r in zip(chosen, rows, strict=True)]
+    return torch.cat([s.points for s in surfaces]), torch.cat([s.normals for s in surfaces])
+
+
+def fit(field: MaterialField, start: Start, views: Views, generator: torch.Generator, progress: Progress) -> None:
+    """Bring an untrained field to the start, in place."""
+    device = field.table.device
+    optimizer = RowAdam(dict(field.named_parameters()), tables=frozenset({"table"}))
+    for step in range(STEPS):
+        progress("reading the words", step, STEPS)
+        some = [views.seen[i] for i in torch.randint(len(views.seen), (VIEWS,), generator=generator).tolist()]
+        points, normals = (t.to(device) for t in random_points(views, some, POINTS, generator))
+        wanted = start(points, normals)
+        if step == 0:
+            field.begin_at(wanted.mean(0))
+        found = field(points).columns()
+        (encoded(found) - encoded(wanted)).square().sum(1).mean().backward()
+        optimizer.step(LEARNING_RATE * (1 - step / STEPS))
+    progress("reading the words", STEPS, STEPS)
