@@ -18,7 +18,7 @@ class SurfaceSamples:
         self.points = points
         self._tree = cKDTree(points)
 
-    def convexity(self, points: NDArray, normals: NDArray, reach: float = REACH) -> NDArray[np.float32]:
+    def convexity(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
         """How far the surface around each point falls off below its tangent plane, against its distance.
 
         Args:
@@ -26,7 +26,7 @@ class SurfaceSamples:
         Returns:
             (P,): about 0.4 on a right-angled edge, 0 on a plane, negative in a crease.
         """
-        distance, index = self._tree.query(points, NEAR, distance_upper_bound=reach)
+        distance, index = self._tree.query(points, NEAR, distance_upper_bound=REACH)
         found = np.isfinite(distance)
         offset = self.points[np.where(found, index, 0)] - points[:, None]
         drop = np.where(found, -(offset * normals[:, None]).sum(-1), 0).sum(1)

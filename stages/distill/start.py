@@ -7,6 +7,7 @@ fitted to that, and the model goes on from there. Seeds draw other patterns of t
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core.convexity import SurfaceSamples
@@ -41,6 +42,22 @@ class Start:
 
     def __init__(self, recipe: Recipe, views: Views, generator: torch.Generator) -> None:
         self._recipe = recipe
+        follows_relief = recipe.layout is not None and recipe.layout.kind in ("edges", "crevices")
+        self._relief = Relief(views, generator) if follows_relief else None
+
+    def __call__(self, points: Tensor, normals: Tensor) -> Tensor:
+        """(P, 5) linear albedo, roughness and metallic of points with normals, (P, 3) each, world."""
+        point, normal = points.cpu().numpy(), normals.cpu().numpy()
+        flat = np.zeros(len(point), np.float32)
+        convexity = flat if self._relief is None else self._relief.convexity(point, normal)
+        surface = Surface(point, normal, convexity, occlusion=flat)
+        return torch.from_numpy(self._recipe.evaluate(surface)).to(points.device)
+
+
+class Relief:
+    """Edges and creases of what the views show, the rounded ones of a smooth thing taken for sharp."""
+
+    def __init__(self, views: Views, generator: torch.Generator) -> None:
         surface = random_points(views, views.seen, 8 * SAMPLES, generator)
         chance = even_chance(surface[0], 4 * views.pixel_size())
         u = torch.rand(SAMPLES, generator=generator, dtype=torch.float64)
@@ -50,15 +67,10 @@ class Start:
         low, high = np.quantile(self._samples.convexity(points, normals), (RELIEF, 1 - RELIEF))
         self._gain = tuple(float(np.clip(SHARP / max(x, 1e-6), 1, MOST_GAIN)) for x in (-low, high))
 
-    def __call__(self, points: Tensor, normals: Tensor) -> Tensor:
-        """(P, 5) linear albedo, roughness and metallic of points with normals, (P, 3) each, world."""
-        point, normal = points.cpu().numpy(), normals.cpu().numpy()
-        layout, convexity = self._recipe.layout, np.zeros(len(point), np.float32)
-        if layout is not None and layout.kind in ("edges", "crevices"):
-            convexity = self._samples.convexity(point, normal)
-            convexity *= np.where(convexity < 0, *self._gain)
-        surface = Surface(point, normal, convexity, np.zeros_like(convexity))
-        return torch.from_numpy(self._recipe.evaluate(surface)).to(points.device)
+    def convexity(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
+        """(P,) as `SurfaceSamples.convexity`, strengthened."""
+        found = self._samples.convexity(points, normals)
+        return (found * np.where(found < 0, *self._gain)).astype(np.float32)
 
 
 def random_points(views: Views, chosen: list[int], count: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:

@@ -63,6 +63,13 @@ def test_a_round_thing_has_no_gold_edge_or_crevice_of_a_quarter(views: Views, la
     assert float(metallic.mean()) < 0.25
 
 
+def test_crevices_are_found_by_the_shape(views: Views) -> None:
+    """A ball seen from within is a hollow."""
+    points, normals = random_points(views, views.seen, 2000, seeded(3))
+    start = Start(recipe("crevices"), views, seeded())
+    assert float(start(points, -normals)[:, 4].mean()) > float(start(points, normals)[:, 4].mean()) + 0.1
+
+
 def test_what_lies_on_top_does(views: Views) -> None:
     points, normals = random_points(views, views.seen, 2000, seeded())
     metallic, height = Start(recipe("top"), views, seeded())(points, normals)[:, 4], points[:, 2]

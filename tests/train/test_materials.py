@@ -2,26 +2,19 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from stages.prior.recipe import LAYOUTS, Surface
+from stages.prior.recipe import LAYOUTS
 from stages.prior.text import split_words
 from stages.train import materials
 from stages.train.captions import COMPOSED, Words, caption
 from stages.train.colors import WORDS
 from stages.train.substances import HELD_OUT, SUBSTANCES
-
-
-def sphere(count: int = 500) -> Surface:
-    rng = default_rng(0)
-    direction = rng.normal(size=(count, 3))
-    normal = (direction / np.linalg.norm(direction, axis=1, keepdims=True)).astype(np.float32)
-    flat = rng.uniform(-0.4, 0.6, count).astype(np.float32), rng.uniform(0, 0.8, count).astype(np.float32)
-    return Surface(normal * np.float32(0.5), normal, *flat)
+from tests.prior.test_recipe import sphere
 
 
 @pytest.mark.parametrize("seed", range(30))
 def test_materials_are_physically_plausible(seed: int) -> None:
     material = materials.random_material(default_rng(seed))
-    values = material.recipe.evaluate(sphere())
+    values = material.recipe.evaluate(sphere(500))
     assert values.shape == (500, 5) and np.isfinite(values).all()
     assert values.min() >= 0 and values.max() <= 1
     assert values[:, :3].min() > 0.0005 and values[:, :3].max() < 0.98  # neither a black hole nor a mirror of all light

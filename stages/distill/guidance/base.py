@@ -32,7 +32,7 @@ class Response:
     derivative of the loss by each value, scaled alike, where the loss is one of least squares: the material is then
     stepped by `stages.distill.gauss_newton`. plain: with a curvature, how far a step takes metallic down and roughness up
     where the pictures leave them open. expected: (P, 5) sRGB albedo, roughness and metallic that the words alone call for at
-    each point, on average.
+    each point.
     """
 
     gradient: Tensor
@@ -46,9 +46,9 @@ class Guidance(Protocol):
     """What an optimisation step asks.
 
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
-    inputs: role -> SHA-256 of the files it was made from. start: from which the field had best begin, or
-    None where it makes no difference. budget: what it calls for where the options leave it
-    open. weights: of its score, or None where it has none.
+    inputs: role -> SHA-256 of the files it was made from. start: from which the field had best begin, or None where it makes
+    no difference. budget: what it calls for where the options leave it open. weights: of its score, or None where it has
+    none.
     """
 
     @property
