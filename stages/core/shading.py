@@ -5,15 +5,19 @@ With transport E, A(r), B(r) of one pixel and one environment (see `stages.light
     radiance = (1 - m) c E + (F0 (1 - m) + m c) A(r) + B(r),   F0 = 0.04
 
 A and B are stored at the roughness `KNOTS`. Between them, what is interpolated is the logarithm of A and B relative to
-the albedo of an open point (`core.albedo`), by a cubic: exact in a white furnace, and right for a small lamp too, whose
-reflection spreads as a power of the roughness.
+the albedo of an open point (`core.albedo`), by a cubic spline over the logarithm of the roughness: exact in a white furnace,
+and right for a small lamp too, whose reflection spreads as a power of the roughness.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from torch import Tensor
 
 from stages.core.albedo import specular_albedo
@@ -68,6 +72,13 @@ infinity."""
 
 TINY = 6e-5
 """The least of that: the smallest normal number that is stored."""
+
+SOFTEN = 0.1
+"""The spline runs over log(roughness + SOFTEN), in which a lamp's reflection bends alike everywhere; 0 must not be far away."""
+
+BULGE = 1.0
+"""A slope of the spline is bounded by three times its interval's, between which slopes a cubic does not overshoot (Fritsch &
+Carlson 1980), and this much of the logarithm more. Lamps keep within it; a mirror's light beside a dark lobe does not."""
 
 LEAST_ALBEDO = 1e-4
 """Under this an open point's albedo is no scale to interpolate by (B, seen head-on); B itself is interpolated there."""
@@ -159,7 +170,8 @@ class _KernelShading(torch.autograd.Function):
 
         light = tuple(t.float().contiguous().numpy() for t in (transport.E, transport.A, transport.B, transport.cosine))
         values = tuple(t.detach().contiguous().numpy() for t in material)
-        out = shading_kernels.shade(light, values, KNOTS, (F0, LEAST_ALBEDO, DARK, TINY))  # type: ignore[arg-type]
+        constants = F0, LEAST_ALBEDO, DARK, TINY, SOFTEN, BULGE
+        out = shading_kernels.shade(light, values, KNOTS, spline_slopes(KNOTS), constants)  # type: ignore[arg-type]
         a, b, c = map(torch.from_numpy, out)
         return a, b, c
 
@@ -178,54 +190,50 @@ def interpolate(
 ) -> tuple[Tensor, Tensor]:
     """A and B at the given roughness, from the knots of the given numbers.
 
-    A cubic Hermite spline of log(y + DARK y_last), with the slopes of parabolas through three knots.
+    A cubic spline of log(y + DARK y_last), smooth to its second derivative wherever `BULGE` leaves it alone.
 
     Args:
         roughness: (P,) in [0, 1].
     Returns:
         (P, 3) each. Differentiable in: roughness.
     """
-    every = torch.tensor(list(kept), device=roughness.device)
-    knots = torch.tensor(KNOTS, dtype=roughness.dtype, device=roughness.device)[every]
-    last = len(knots) - 1
+    place, last = list(kept), len(kept) - 1
+    knots = torch.tensor([KNOTS[k] for k in place], dtype=roughness.dtype, device=roughness.device)
+    slopes = torch.tensor(spline_slopes(tuple(KNOTS[k] for k in place)), dtype=roughness.dtype, device=roughness.device)
     left = torch.searchsorted(knots, roughness.detach().contiguous(), right=True).sub(1).clamp(0, last - 1)  # (P,)
-    near = torch.stack([(left + k).clamp(0, last) for k in (-1, 0, 1, 2)], 1)  # (P, 4)
-    r = knots[near]
-    row = torch.arange(len(roughness), device=roughness.device)[:, None]
-    place = every[near]
-    stacked = torch.cat([transport.A[row, place], transport.B[row, place]], -1).to(roughness.dtype)  # (P, 4, 6)
-    scale = _knot_albedo(transport.cosine.to(roughness.dtype)).repeat_interleave(3, -1)  # (P, K, 6)
-    end = kept[-1]
-    roughest = torch.cat([transport.A[:, end], transport.B[:, end]], -1).to(roughness.dtype) / scale[:, end]
-    dark = DARK * roughest.clamp(min=0) + TINY  # (P, 6)
-    y = torch.log((stacked / scale[row, place]).clamp(min=0) + dark[:, None])
-    step = (r[:, 1:] - r[:, :-1])[..., None]  # (P, 3, 1); 0 beyond the ends
-    rise = (y[:, 1:] - y[:, :-1]) / torch.where(step > 0, step, torch.ones_like(step))
-    slope_left = _slope(rise[:, 0], rise[:, 1], step[:, 0], step[:, 1])
-    slope_right = _slope(rise[:, 1], rise[:, 2], step[:, 1], step[:, 2])
-    h = step[:, 1]
-    x = (roughness[:, None] - r[:, 1:2]) / h
-    ease, tail = x * x * (3 - 2 * x), x * x * (x - 1)
-    spline = y[:, 1] * (1 - ease) + y[:, 2] * ease + h * (slope_left * x * (1 - x) ** 2 + slope_right * tail)
+    stored = torch.cat([transport.A[:, place], transport.B[:, place]], -1).to(roughness.dtype)  # (P, K, 6)
+    scale = _knot_albedo(transport.cosine.to(roughness.dtype))[:, place].repeat_interleave(3, -1)
+    relative = (stored / scale).clamp(min=0)
+    dark = DARK * relative[:, -1] + TINY  # (P, 6)
+    y = torch.log(relative + dark[:, None])
+    slope = slopes @ y
+    row, bent = torch.arange(len(roughness), device=roughness.device), torch.log(knots + SOFTEN)
+    h = (bent[left + 1] - bent[left])[:, None]
+    x = (torch.log(roughness + SOFTEN) - bent[left])[:, None] / h
+    rise = y[row, left + 1] - y[row, left]
+    least, most = 3 * rise.clamp(max=0) - BULGE, 3 * rise.clamp(min=0) + BULGE
+    head, tail = ((h * slope[row, left + k]).clamp(least, most) for k in (0, 1))
+    spline = y[row, left] + rise * x * x * (3 - 2 * x) + head * x * (1 - x) ** 2 - tail * x * x * (1 - x)
     relative = (torch.exp(spline) - dark).clamp(min=0)  # beside a steep fall the spline dips under black
     albedo = specular_albedo(roughness, transport.cosine.to(roughness.dtype)).clamp(min=LEAST_ALBEDO)
     A, B = (relative * albedo.repeat_interleave(3, -1)).split(3, -1)
     return A, B
 
 
+@functools.lru_cache(maxsize=4)
+def spline_slopes(knots: tuple[float, ...]) -> NDArray[np.float64]:
+    """What a spline's slopes at its knots are made of: slopes = result @ values, by log(roughness + SOFTEN). (K, K).
+
+    The third derivative is continuous at the last knots but one ("not a knot").
+    """
+    x = np.log(np.array(knots) + SOFTEN)
+    return CubicSpline(x, np.eye(len(x)))(x, 1)
+
+
 def _knot_albedo(cosine: Tensor) -> Tensor:
     """Open-point albedo of A and B at every knot. Args: (P,). Returns: (P, K, 2), positive."""
     albedo = [specular_albedo(torch.full_like(cosine, r), cosine) for r in KNOTS]
     return torch.stack(albedo, 1).clamp(min=LEAST_ALBEDO)
-
-
-def _slope(before: Tensor, after: Tensor, step_before: Tensor, step_after: Tensor) -> Tensor:
-    """Slope at a knot of the parabola through it and its neighbours, from the slopes and widths of its two intervals.
-
-    At the ends, where one interval has no width, it is the slope of the other.
-    """
-    inner = (before * step_after + after * step_before) / (step_before + step_after)
-    return torch.where(step_before > 0, torch.where(step_after > 0, inner, before), after)
 
 
 def light_maps(transport: Transport) -> Tensor:

@@ -28,20 +28,21 @@ def shade(
     transport: tuple[Values, Values, Values, Values],
     material: tuple[Values, Values, Values],
     knots: tuple[float, ...],
-    constants: tuple[float, float, float, float],
+    slopes: NDArray[np.float64],
+    constants: tuple[float, ...],
 ) -> tuple[Values, Values, Values]:
     """Radiance and what its gradient needs.
 
     Args:
         transport: E (N, 3), A and B (N, K, 3), cosine (N,). material: albedo (P, 3), roughness (P,), metallic (P,);
-        N = P L. constants: F0, the least albedo to interpolate by, DARK and the least DARK y.
+        N = P L. slopes: of `stages.core.shading.spline_slopes`. constants: F0, LEAST_ALBEDO, DARK, TINY, SOFTEN, BULGE there.
     Returns:
         radiance, interpolated A, and d radiance / d roughness: (N, 3) each.
     """
     count = len(transport[0])
     lights = count // max(len(material[1]), 1)
     out = tuple(np.empty((count, 3), np.float32) for _ in range(3))
-    tables = (_knot_table(knots), albedo.table(), np.array(knots, np.float32))
+    tables = (_knot_table(knots), albedo.table(), np.array(knots, np.float32), slopes.astype(np.float32))
     floats = tuple(map(np.float32, constants))
     tasks = [
         (part.start, lights, *(t[part] for t in transport), *material, *tables, *floats, *(o[part] for o in out))
@@ -69,40 +70,24 @@ def shade_backward(
 
 
 @numba.njit(nogil=True, cache=True, error_model="numpy")
-def _slope(before, after, step_before, step_after):  # type: ignore[no-untyped-def]
-    """As `stages.core.shading._slope`."""
-    if step_before <= 0:
-        return after
-    if step_after <= 0:
-        return before
-    return (before * step_after + after * step_before) / (step_before + step_after)
-
-
-@numba.njit(nogil=True, cache=True, error_model="numpy")
 def _shade(  # type: ignore[no-untyped-def]
-    first, lights, E, A, B, cosine, c, roughness, metallic, knot_table, table, knots, f0, least, dark, tiny, out, out_a, out_r
-):
+    first, lights, E, A, B, cosine, c, roughness, metallic, knot_table, table, knots, slopes, f0, least, dark, tiny, soften,
+    bulge, out, out_a, out_r
+):  # fmt: skip
     one = np.float32(1)
-    last = len(knots) - 1
+    count = len(knots)
     rows, columns = len(table), table.shape[1]
-    y, value, slope = np.empty(4, np.float32), np.empty(2, np.float32), np.empty(2, np.float32)
-    near, step, scale = np.empty(5, np.int64), np.empty(3, np.float32), np.empty((5, 2), np.float32)
-    near[4] = last
-    open_point, by_r = np.empty(2, np.float32), np.empty(2, np.float32)
+    bent = np.log(knots + soften)
+    y, value, slope = np.empty(count, np.float32), np.empty(2, np.float32), np.empty(2, np.float32)
+    scale, open_point, by_r = np.empty((count, 2), np.float32), np.empty(2, np.float32), np.empty(2, np.float32)
     for i in range(len(E)):
         p = (first + i) // lights
         r, m = roughness[p], metallic[p]
         left = 0
-        while left < last - 1 and knots[left + 1] <= r:
+        while left < count - 2 and knots[left + 1] <= r:
             left += 1
-        for k in range(4):
-            near[k] = min(max(left + k - 1, 0), last)
-        for k in range(3):
-            step[k] = knots[near[k + 1]] - knots[near[k]]
-        h = step[1]
-        x = (r - knots[left]) / h
-        ease, tail = x * x * (3 - 2 * x), x * x * (x - one)
-        head = x * (one - x) * (one - x)
+        h = bent[left + 1] - bent[left]
+        x = (np.log(r + soften) - bent[left]) / h
         u = np.sqrt(min(max(cosine[i], np.float32(0)), one)) * np.float32(columns - 1)
         column = min(int(u), columns - 2)
         fu = u - np.float32(column)
@@ -115,29 +100,27 @@ def _shade(  # type: ignore[no-untyped-def]
             exact = low * (one - fv) + high * fv
             open_point[term] = max(exact, least)
             by_r[term] = (high - low) * np.float32(rows - 1) if exact >= least else np.float32(0)
-        for k in range(5):
-            for term in range(2):
-                n = near[k]
-                known = knot_table[n, column, term] * (one - fu) + knot_table[n, column + 1, term] * fu
+            for k in range(count):
+                known = knot_table[k, column, term] * (one - fu) + knot_table[k, column + 1, term] * fu
                 scale[k, term] = one / max(known, least)
         for j in range(3):
             for term in range(2):
-                roughest = A[i, last, j] if term == 0 else B[i, last, j]
-                least_y = dark * max(roughest * scale[4, term], np.float32(0)) + tiny
-                for k in range(4):
-                    n = near[k]
-                    stored = A[i, n, j] if term == 0 else B[i, n, j]
-                    y[k] = np.log(max(stored * scale[k, term], np.float32(0)) + least_y)
-                rise0 = (y[1] - y[0]) / step[0] if step[0] > 0 else np.float32(0)
-                rise1 = (y[2] - y[1]) / h
-                rise2 = (y[3] - y[2]) / step[2] if step[2] > 0 else np.float32(0)
-                a = _slope(rise0, rise1, step[0], h)
-                b = _slope(rise1, rise2, h, step[2])
-                raised = np.exp(y[1] * (one - ease) + y[2] * ease + h * (a * head + b * tail))
+                stored = A[i, :, j] if term == 0 else B[i, :, j]
+                least_y = dark * max(stored[count - 1] * scale[count - 1, term], np.float32(0)) + tiny
+                a, b = np.float32(0), np.float32(0)
+                for k in range(count):
+                    y[k] = np.log(max(stored[k] * scale[k, term], np.float32(0)) + least_y)
+                    a += slopes[left, k] * y[k]
+                    b += slopes[left + 1, k] * y[k]
+                rise = y[left + 1] - y[left]
+                lowest, highest = 3 * min(rise, np.float32(0)) - bulge, 3 * max(rise, np.float32(0)) + bulge
+                a, b = min(max(h * a, lowest), highest), min(max(h * b, lowest), highest)
+                spline = y[left] + x * (x * (3 - 2 * x) * rise + (one - x) * (a * (one - x) - b * x))
+                raised = np.exp(spline)
                 relative = max(raised - least_y, np.float32(0))
-                change = rise1 * 6 * x * (one - x) + a * (one - x) * (one - 3 * x) + b * x * (3 * x - 2)
+                change = rise * 6 * x * (one - x) + a * (one - x) * (one - 3 * x) + b * x * (3 * x - 2)
                 value[term] = relative * open_point[term]
-                change = raised * change if relative > 0 else np.float32(0)
+                change = raised * change / (h * (r + soften)) if relative > 0 else np.float32(0)
                 slope[term] = change * open_point[term] + relative * by_r[term]
             diffuse, f = (one - m) * c[p, j], f0 * (one - m) + m * c[p, j]
             out[i, j] = diffuse * E[i, j] + f * value[0] + value[1]

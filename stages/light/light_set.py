@@ -53,7 +53,8 @@ class LightSet:
     texels, cumulative: of all environments after each other, the excess texels along a Morton curve, on which every
     cell is one stretch, and the running sum of their shares of their environment's energy.
     cells: the squares of FINE / CELLS texels that hold excess.
-    demand: (environments,) how light rays are best shared out: the noise that one ray in each would leave, tone-mapped.
+    demand: (environments,) how light rays are best shared out: the noise that one ray in each would leave, as a share of the
+    environment's mean, for a dim one is exposed longer.
     """
 
     environments: tuple[Environment, ...]
@@ -110,10 +111,10 @@ def light_set(environments: list[Environment]) -> LightSet:
 
 
 def _demand(residual: NDArray, excess: NDArray, energy: NDArray) -> float:
-    """Excess radiance times the slope of x / (1 + x) at the mean, times how unsure it is which cell a ray goes to."""
+    """Share of the light that is excess, times how unsure it is which cell a ray goes to."""
     bright = float(luminance(excess).mean())
     mean = bright + float(luminance(residual).mean())
-    return bright / (1 + mean) ** 2 * float(np.sqrt(max(1 - np.square(energy).sum(), 0.0)))
+    return bright / max(mean, np.finfo(float).tiny) * float(np.sqrt(max(1 - np.square(energy).sum(), 0.0)))
 
 
 def _cells(energy: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float64], Cells]:

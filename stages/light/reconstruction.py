@@ -2,7 +2,8 @@
 
 The rays of a point come in two halves; their difference tells the variance. A sum is replaced by a weighted mean over
 the window around its pixel, of those neighbours that lie on the same surface and differ from it by no more than noise
-explains. Where nothing is noisy nothing changes, so the bias falls with the variance.
+explains. Where nothing is noisy nothing changes, so the bias falls with the variance. Sums of which the differences count,
+as those of one lobe at many roughnesses, share their weights: what they have in common then cancels as it did before.
 
 Source: Rousselle, Knaus & Zwicker 2012, "Adaptive Rendering with Non-Local Means Filtering" (two halves, acceptance by
 variance).
@@ -18,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.light.gbuffer import GBuffer
-from stages.light.light_set import CHANNELS
 
 RADIUS = 2
 """Of the window, pixels: it holds every class of a 4 x 4 block of interleaved samples at least once."""
@@ -26,6 +26,10 @@ RADIUS = 2
 TOLERANCE = 12.0
 """A neighbour counts for nothing when its squared difference exceeds this many times the sum of both variances; its own
 is taken for no more than the point's, so that noise does not flow to where there is none."""
+
+JOINT = 8.0
+"""Of sums that share their weights a neighbour counts for nothing when its squared differences exceed this many times what
+noise explains, on average over them."""
 
 TOGETHER = 8.0
 """Nor does it count when the squared differences of the first sum, diffuse light, exceed this many times what noise explains,
@@ -86,9 +90,14 @@ def merge(into: Estimate, rows: NDArray[np.int64], more: Estimate, share: NDArra
     _in_parts(part, len(rows), POINTS_PER_TASK)
 
 
-def smoothed(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
-    """The sums, (P, ...), with the noise of variance `noise` averaged away."""
-    return _weighted(mean, noise, near, 1).reshape(mean.shape)
+def smoothed(
+    mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, joint: tuple[int, ...] = ()
+) -> NDArray[np.float32]:
+    """The sums, (P, sums, channels), with the noise of variance `noise` averaged away.
+
+    joint: sums that share their weights, channel by channel; the others have their own.
+    """
+    return _weighted(mean, noise, near, 1, joint)
 
 
 def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, count: int) -> NDArray[np.int64]:
@@ -98,17 +107,23 @@ def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighb
     """
     if count == 0:
         return np.zeros(0, np.int64)
-    left = _weighted(mean, noise, near, 2) / (1 + mean.reshape(len(mean), -1).clip(0)) ** 4
-    return np.sort(np.argpartition(-left.sum(1), count - 1)[:count])
+    left = _weighted(mean, noise, near, 2) / (1 + mean.clip(0)) ** 4
+    return np.sort(np.argpartition(-left.sum((1, 2)), count - 1)[:count])
 
 
-def _weighted(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, power: int) -> NDArray[np.float32]:
-    """Over each point's neighbours, (P, values): the weighted mean of the sums, power 1, or that mean's variance, power 2."""
+def _weighted(
+    mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, power: int, joint: tuple[int, ...] = ()
+) -> NDArray[np.float32]:
+    """Over each point's neighbours: the weighted mean of the sums, power 1, or that mean's variance, power 2."""
     flat, noise = (np.ascontiguousarray(_rows(a)) for a in (mean, noise))
     values, result = flat if power == 1 else noise, np.empty_like(flat)
-    geometry = (near.index, near.pixel, near.n, near.point)
-    _in_parts(lambda a, b: _average(flat, noise, values, power, *geometry, a, b, result), len(mean), POINTS_PER_TASK)
-    return result
+    shared, geometry = np.isin(np.arange(mean.shape[1]), joint), (near.index, near.pixel, near.n, near.point)
+
+    def part(start: int, end: int) -> None:
+        _average(flat, noise, values, power, shared, mean.shape[-1], geometry, start, end, result)
+
+    _in_parts(part, len(mean), POINTS_PER_TASK)
+    return result.reshape(mean.shape)
 
 
 def _rows(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -173,36 +188,50 @@ def _same(n, point, p, q):  # type: ignore[no-untyped-def]
 
 
 @fast
-def _alike(mean, noise, p, q, k):  # type: ignore[no-untyped-def]
-    """How far noise explains the difference of one sum at two points, 0 to 1."""
-    f32 = np.float32
+def _unlike(mean, noise, p, q, k):  # type: ignore[no-untyped-def]
+    """Squared difference of one value at two points, as a multiple of what noise explains."""
     difference = mean[p, k] - mean[q, k]
-    allowed = f32(TOLERANCE) * (noise[p, k] + min(noise[p, k], noise[q, k])) + f32(1e-20)
-    near = max(f32(0), f32(1) - difference * difference / allowed)
-    return near * near
+    return difference * difference / (noise[p, k] + min(noise[p, k], noise[q, k]) + np.float32(1e-20))
 
 
 @fast
-def _alike_together(mean, noise, p, q):  # type: ignore[no-untyped-def]
+def _alike_together(mean, noise, channels, p, q):  # type: ignore[no-untyped-def]
     """How far noise explains the differences of the first sum at two points, taken together, 0 to 1."""
     f32 = np.float32
     excess, count = f32(0), 0
-    for k in range(min(CHANNELS, mean.shape[1])):
-        allowed = noise[p, k] + min(noise[p, k], noise[q, k])
-        if allowed > f32(0):
-            difference = mean[p, k] - mean[q, k]
-            excess += difference * difference / allowed
+    for k in range(channels):
+        if noise[p, k] > f32(0):
+            excess += _unlike(mean, noise, p, q, k)
             count += 1
     return max(f32(0), f32(1) - excess / (f32(TOGETHER) * f32(max(count, 1))))
 
 
 @fast
-def _average(mean, noise, values, power, index, pixel, n, point, start, end, result):  # type: ignore[no-untyped-def]
+def _share(unlike, shared, together):  # type: ignore[no-untyped-def]
+    """Give the joint sums what they are unlike on average, channel by channel, in place. unlike: (sums, channels)."""
+    together[:] = 0
+    count = 0
+    for k in range(len(shared)):
+        if shared[k]:
+            count += 1
+            for c in range(len(together)):
+                together[c] += unlike[k, c]
+    scale = np.float32(TOLERANCE / JOINT) / np.float32(max(count, 1))
+    for k in range(len(shared)):
+        if shared[k]:
+            for c in range(len(together)):
+                unlike[k, c] = together[c] * scale
+
+
+@fast
+def _average(mean, noise, values, power, shared, channels, near, start, end, result):  # type: ignore[no-untyped-def]
     """Sum of w^power values over the sum of w, to that power."""
     f32 = np.float32
+    index, pixel, n, point = near
     height, width = index.shape
     size = mean.shape[1]
-    total, weight = np.empty(size, np.float32), np.empty(size, np.float32)
+    total, weight, unlike = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
+    together, by_sum = np.empty(channels, np.float32), unlike.reshape(-1, channels)
     for p in range(start, end):
         x, y = pixel[p]
         total[:] = values[p]
@@ -214,11 +243,15 @@ def _average(mean, noise, values, power, index, pixel, n, point, start, end, res
                     continue
                 same = _same(n, point, p, q)
                 if same > f32(0):
-                    same *= _alike_together(mean, noise, p, q)
+                    same *= _alike_together(mean, noise, channels, p, q)
                 if same <= f32(0):
                     continue
                 for k in range(size):
-                    w = same * _alike(mean, noise, p, q, k)
+                    unlike[k] = _unlike(mean, noise, p, q, k)
+                _share(by_sum, shared, together)
+                for k in range(size):
+                    left = max(f32(0), f32(1) - unlike[k] * f32(1 / TOLERANCE))
+                    w = same * left * left
                     weight[k] += w
                     total[k] += (w if power == 1 else w * w) * values[q, k]
         for k in range(size):

@@ -24,8 +24,8 @@ class Terms:
     roughness: of the glossy lobes. shares: of the lobe rays, the cosine lobe's, then each glossy one's. stored: sums that a
     point keeps, `mirror` among them, the two of roughness 0, which are looked up and not summed. judged: by which noise is
     judged, what a picture of a rough thing is made of. sharp: those that are left as traced, for they show edges that no
-    neighbour knows of. principled: False for glTF's, or weights of Burley's departure from Lambert and of the dielectric's
-    reflection.
+    neighbour knows of. joint: those of which the differences count too, for roughness has a slope. principled: False for
+    glTF's, or weights of Burley's departure from Lambert and of the dielectric's reflection.
     """
 
     roughness: tuple[float, ...]
@@ -34,6 +34,7 @@ class Terms:
     mirror: tuple[int, int]
     judged: tuple[int, ...]
     sharp: tuple[int, ...]
+    joint: tuple[int, ...] = ()
     principled: tuple[bool, float, float] = (False, 0.0, 0.0)
 
     @property
@@ -79,6 +80,7 @@ GLTF = Terms(
     mirror=(1, 1 + _K),
     judged=(0, 1 + KNOTS.index(0.5), 1 + KNOTS.index(1.0)),
     sharp=(2, 2 + _K),
+    joint=(*range(3, 1 + _K), *range(3 + _K, 1 + 2 * _K)),
 )
 """E, A at every knot, B at every knot."""
 

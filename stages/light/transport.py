@@ -77,7 +77,7 @@ SEED_STEP = 0x5EED
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
 
-QUALITY = {"draft": Quality(19, 8), "standard": Quality(38, 16), "high": Quality(304, 128)}
+QUALITY = {"draft": Quality(19, 9), "standard": Quality(38, 18), "high": Quality(304, 144)}
 
 AIM = np.array([alpha_from_roughness(r) for r in (0.5, 1.0)], np.float32)
 """Glossy lobes that light rays are aimed for, beside the diffuse one."""
@@ -159,7 +159,7 @@ def gather(
 def smoothed(sums: Sums, near: reconstruction.Neighbours, terms: Terms = GLTF) -> NDArray[np.float32]:
     """The sums with their noise averaged away, (P, stored, CHANNELS); forgets the variance of the sharp ones."""
     sums.variance[:, terms.sharp] = 0
-    return reconstruction.smoothed(sums.mean, sums.variance, near)
+    return reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
 
 
 def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:

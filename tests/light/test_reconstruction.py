@@ -30,7 +30,7 @@ def test_variance_is_that_of_the_mean() -> None:
 
 def test_noise_on_a_wall_falls_threefold() -> None:
     near = plane()
-    truth = np.full((len(near.n), 3), 2.0)
+    truth = np.full((len(near.n), 1, 3), 2.0)
     mean, gap = noisy(truth, 0.1)
     before, after = (np.sqrt(np.square(a - truth).mean()) for a in (mean, smoothed(mean, variance(gap, near), near)))
     assert after < 0.33 * before
@@ -38,7 +38,7 @@ def test_noise_on_a_wall_falls_threefold() -> None:
 
 def test_an_edge_beyond_the_noise_stays() -> None:
     near = plane()
-    truth = np.where(near.pixel[:, :1] < 20, 1.0, 3.0)
+    truth = np.where(near.pixel[:, :1, None] < 20, 1.0, 3.0)
     mean, gap = noisy(truth, 0.05)
     result = smoothed(mean, variance(gap, near), near)
     assert np.abs(result - truth).max() < 0.2
@@ -46,7 +46,7 @@ def test_an_edge_beyond_the_noise_stays() -> None:
 
 def test_what_has_no_noise_is_left_alone() -> None:
     near = plane()
-    mean = np.random.default_rng(1).random((len(near.n), 4)).astype(np.float32)
+    mean = np.random.default_rng(1).random((len(near.n), 1, 4)).astype(np.float32)
     assert smoothed(mean, np.zeros_like(mean), near) == pytest.approx(mean, abs=1e-6)
 
 
@@ -54,10 +54,25 @@ def test_another_surface_is_not_mixed_in() -> None:
     near = plane()
     right = near.pixel[:, 0] >= 20
     near.point[right, 2] = 0.5 * 40  # behind a silhouette
-    truth = np.where(right, 1.0, 1.02)[:, None]
+    truth = np.where(right, 1.0, 1.02)[:, None, None]
     mean, _ = noisy(truth, 0.0)
     result = smoothed(mean, np.full_like(mean, 0.01), near)
     assert result == pytest.approx(truth, abs=1e-5)
+
+
+def test_joint_sums_keep_what_they_have_in_common() -> None:
+    """Two sums share most of their noise, as lobes of one point share rays: it is no noise of their difference."""
+    near = plane()
+    shape = len(near.n), 1, 1
+    common, gap = noisy(np.full(shape, 2.0), 0.1)
+    own, own_gap = (np.roll(a, 7, 0) * np.array([0.2, -0.2])[:, None] for a in noisy(np.zeros(shape), 0.1))
+    mean, noise = (common + own).astype(np.float32), variance((gap + own_gap).astype(np.float32), near)
+
+    def error(joint: tuple[int, ...]) -> float:
+        result = smoothed(mean, noise, near, joint)
+        return float((result[:, 0] - result[:, 1]).std())
+
+    assert error((0, 1)) < 0.85 * error(())
 
 
 def alone(count: int) -> Neighbours:
