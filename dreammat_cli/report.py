@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, reporter, show
-from stages.report.options import DistillReportOptions, PriorReportOptions, ReportOptions
+from stages.report.options import DistillReportOptions, PriorReportOptions, ReportOptions, TransferReportOptions
 
 DEFAULT, PRIOR, DISTILL = defaults(ReportOptions), defaults(PriorReportOptions), defaults(DistillReportOptions)
 
@@ -51,6 +51,8 @@ def conditions(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
 @click.option("--steps", type=click.IntRange(1), default=PRIOR["steps"], metavar="N",
               help="Of every distillation.  [default: as `distill`]")
 @click.option("--views", type=click.IntRange(1, 9999), default=PRIOR["views"], show_default=True, help="Cameras of a mesh.")
+@click.option("--ladder/--no-ladder", default=PRIOR["ladder"], show_default=True,
+              help="Also take conditions away from the model, as the paper's ablation does.")
 @common_options
 def prior(mesh: tuple[str, ...], output: Path, common: Common, **chosen: Any) -> None:
     """Judge the embedded prior by a fixed list of prompts on MESH files, or on six shapes of its own.
@@ -91,3 +93,19 @@ def distill(conditions: Path, output: Path, common: Common, **chosen: Any) -> No
     with reporter(common) as progress:
         report = report_distill(conditions, output, options, progress)
     show(common, dataclasses.asdict(report), summary(report))
+
+
+@command.command()
+@click.argument("prep", type=INPUT, metavar="PREP.npz")
+@click.argument("material", type=INPUT, metavar="MATERIAL.npz")
+@click.argument("asset", type=INPUT, metavar="ASSET")
+@click.option("--reference", type=INPUT, required=True, metavar="MODEL.glb", help="The textured model of the same shape.")
+@common_options
+def transfer(prep: Path, material: Path, asset: Path, common: Common, reference: Path) -> None:
+    """How exactly `distill --guidance reference` and `bake` brought the material of MODEL.glb over to the folder ASSET."""
+    if plan(common, "measure", asset, TransferReportOptions(reference)):
+        return
+    from stages.report.transfer import report_transfer
+
+    found = dataclasses.asdict(report_transfer(prep, material, asset, reference))
+    show(common, found, [f"{name.replace('_', ' '):18} {value:.4g}" for name, value in found.items()])

@@ -19,7 +19,7 @@ from stages.core.frames import transform_points
 from stages.light.scene import Scene
 
 REACH = 5e-3
-"""The model's surface is looked for this far before and behind a seen point, world units."""
+"""The model's surface is looked for this far before and behind a seen point, world units, unless told otherwise."""
 
 _SRGB = srgb_decode(np.arange(256) / 255.0).astype(np.float32)
 _BYTE = (np.arange(256) / 255.0).astype(np.float32)
@@ -91,18 +91,21 @@ class TexturedModel:
         self._uv, self._part = np.concatenate(uv), np.concatenate(part)
         self._scene = Scene(np.concatenate(vertices), corners, np.zeros((*corners.shape, 3)))
 
-    def material_at(self, points: NDArray, eyes: NDArray) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    def material_at(
+        self, points: NDArray, eyes: NDArray, reach: float = REACH
+    ) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """The material where the line of sight meets the surface near each point.
 
         Args:
-            points: (P, 3) world, on or near the surface. eyes: (P, 3), from where the points are seen.
+            points: (P, 3) world, on or near the surface. eyes: (P, 3), from where the points are seen. reach: how far
+            before and behind a point the surface is looked for.
         Returns:
-            (P, 5) albedo, roughness, metallic; (P,) whether the surface was found within `REACH`.
+            (P, 5) albedo, roughness, metallic; (P,) whether the surface was found.
         """
         sight = points - eyes
         sight = sight / np.linalg.norm(sight, axis=1, keepdims=True)
-        hits = self._scene.intersect(points - REACH * sight, sight)
-        found = hits.mask & (hits.t < 2 * REACH)
+        hits = self._scene.intersect(points - reach * sight, sight)
+        found = hits.mask & (hits.t < 2 * reach)
         uv = np.einsum("pk,pkd->pd", hits.barycentric[found], self._uv[hits.triangle[found]])
         part = self._part[hits.triangle[found]]
         values = np.zeros((len(uv), 5), np.float32)

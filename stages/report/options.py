@@ -1,6 +1,7 @@
 """What `dreammat report` can be told."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,16 @@ class PriorReportOptions:
     """of every distillation; None for the default"""
     views: int = 48
     """cameras of every mesh"""
+    ladder: bool = True
+    """also take conditions away, as the paper's ablation does: 50 more runs a seed"""
+
+
+@dataclass(frozen=True)
+class TransferReportOptions:
+    """Options of the report on a texture transfer."""
+
+    reference: Path | None = None
+    """the textured model that the transfer was told to follow"""
 
 
 @dataclass(frozen=True)

@@ -69,8 +69,8 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lines = prior.report_prior(tmp_path, options)
     with (tmp_path / "prior.csv").open() as stream:
         rows = list(csv.DictReader(stream))
-    assert {(row["given"], row["lights"]) for row in rows} == {
-        ("full", "all"), ("geometry", "all"), ("full", "one"),
+    assert {(row["given"], row["lights"], row["alone"]) for row in rows} == {
+        ("full", "all", "False"), ("full", "all", "True"), ("geometry", "all", "True"), ("full", "one", "True"),
     }  # fmt: skip
     assert all(0 <= float(row["decided"]) <= 1 and float(row["relight_percent"]) >= 0 for row in rows if not row["regions"])
     assert {line.measure for line in lines} >= {"roughness error", "identified, %", "baked light, |correlation|"}
