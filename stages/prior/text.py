@@ -1,12 +1,14 @@
 """Text encoder of the prior: shipped word vectors, and a small transformer trained with the diffusion model.
 
-A word that the table lacks takes the vector of its stem, of the two words it is made of, or of the table's words that
+A word that was never taught is read as the taught words by which a dictionary explains it ("mauve": pale greyish violet).
+One that the table lacks takes the vector of its stem, of the two words it is made of, or of the table's words that
 are spelt most alike; so every prompt has an embedding, and it is a function of the prompt alone.
 """
 
 import functools
 import re
 import unicodedata
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,11 +24,12 @@ from stages.prior.recipe import LAYOUTS, Recipe, draw_coat, draw_layout
 
 VOCABULARY = Schema(
     "dreammat.vocabulary",
-    1,
+    2,
     {
         "words": Field("u1", ("B",)),  # ASCII, one word a line, sorted
         "vectors": Field("i1", ("W", "D")),  # unit word vectors divided by scale
         "scale": Field("f4", ()),
+        "explained": Field("u1", ("X",)),  # ASCII, a line each: a word, and those that it is read as
     },
 )
 
@@ -45,19 +48,30 @@ ALIKE = 0.35
 
 
 class Vocabulary:
-    """Word vectors by word. words: sorted. vectors: (W, D) float32, unit length."""
+    """Word vectors by word. words: sorted. vectors: (W, D) float32, unit length. explained: words by what they are read as."""
 
-    def __init__(self, words: list[str], vectors: NDArray[np.float32]) -> None:
+    def __init__(
+        self, words: list[str], vectors: NDArray[np.float32], explained: Mapping[str, Sequence[str]] | None = None
+    ) -> None:
         self.index = {word: i for i, word in enumerate(words)}
-        self.vectors = vectors
+        self.vectors, self.explained = vectors, explained or {}
         self._known: dict[str, NDArray[np.float32]] = {}
 
     @classmethod
     def load(cls, path: Path) -> "Vocabulary":
         """Read the shipped table. Raises: ArtifactError."""
         table = load_npz(path, VOCABULARY)
-        words = table["words"].tobytes().decode("ascii").split("\n")
-        return cls(words, table["vectors"].astype(np.float32) * table["scale"])
+        words, told = (table[name].tobytes().decode("ascii").split("\n") for name in ("words", "explained"))
+        explained = {word: rest for word, *rest in map(str.split, told)}
+        return cls(words, table["vectors"].astype(np.float32) * table["scale"], explained)
+
+    def read(self, prompt: str) -> list[str]:
+        """The words of a prompt as they are read: without articles, each unknown one explained by what is not there yet."""
+        words, read = split_words(prompt), list[str]()
+        for word in words:
+            told = self.explained.get(word) or self.explained.get(word.removesuffix("s")) or [word]
+            read += [w for w in told if w == word or w not in words + read]
+        return read[:MAX_WORDS]
 
     def vector(self, word: str) -> NDArray[np.float32]:
         """(D,) of any word; zero for one that resembles nothing in the table."""
@@ -110,7 +124,7 @@ class Vocabulary:
         vectors = np.zeros((len(prompts), MAX_WORDS, self.vectors.shape[1]), np.float32)
         present = np.zeros((len(prompts), MAX_WORDS), bool)
         for i, prompt in enumerate(prompts):
-            for k, word in enumerate(split_words(prompt)[:MAX_WORDS]):
+            for k, word in enumerate(self.read(prompt)):
                 vectors[i, k], present[i, k] = self.vector(word), True
         return torch.from_numpy(vectors), torch.from_numpy(present)
 

@@ -1,5 +1,6 @@
 """Captions: the same material in many wordings, as users write prompts."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -52,6 +53,13 @@ COMPOSED = {
                  "{x} with {y} in recesses"),
 }
 """Wordings by where the second substance y lies on the first, x."""
+
+
+def template_words() -> set[str]:
+    """Every word that a caption has beside the names of materials and objects."""
+    simple, composed = (text for text, _ in SIMPLE), (text for own in COMPOSED.values() for text in own)
+    wordings = [*simple, *composed, *PREFIXES, *SUFFIXES, *VIEWS]
+    return {word for text in wordings for word in re.findall("[a-z]+", text.format(x="", y="", o="").lower())}
 
 
 def pick(rng: Generator, options: Sequence[str]) -> str:

@@ -83,8 +83,8 @@ LEANINGS = {"reddish": "red", "yellowish": "yellow", "greenish": "green", "bluis
 """Words that let a colour lean towards another."""
 
 LEAN = 0.35
-CHANGED, LEANING = 0.2, 0.08
-"""Shares of the drawn colours that such a word is put before."""
+CHANGED, LEANING, BOTH = 0.2, 0.08, 0.06
+"""Shares of the drawn colours that such a word is put before, or one of either: "pale greyish violet", as dictionaries say."""
 
 WORDS = (*COLORS, *CHANGES, *LEANINGS)
 """All that the name of a colour may be made of."""
@@ -95,13 +95,11 @@ def draw_named(rng: Generator) -> tuple[str, NDArray]:
     names = list(COMMON if rng.random() < COMMON_SHARE else RARE)
     name = names[rng.integers(len(names))]
     kind = 1.0 if " " in name else rng.random()
-    if kind < CHANGED:
-        word = list(CHANGES)[rng.integers(len(CHANGES))]
-    elif kind < CHANGED + LEANING:
-        word = list(LEANINGS)[rng.integers(len(LEANINGS))]
-    else:
-        return name, rgb(COLORS[name])
-    return f"{word} {name}", named(f"{word} {name}")
+    if CHANGED <= kind < CHANGED + LEANING + BOTH:
+        name = f"{list(LEANINGS)[rng.integers(len(LEANINGS))]} {name}"
+    if kind < CHANGED or CHANGED + LEANING <= kind < CHANGED + LEANING + BOTH:
+        name = f"{list(CHANGES)[rng.integers(len(CHANGES))]} {name}"
+    return name, named(name)
 
 
 def named(name: str) -> NDArray[np.float64]:
@@ -109,7 +107,7 @@ def named(name: str) -> NDArray[np.float64]:
     if name in COLORS:
         return rgb(COLORS[name])
     word, base = name.split(" ", 1)
-    color = rgb(COLORS[base])
+    color = named(base)
     if word in LEANINGS:
         return color + LEAN * (rgb(COLORS[LEANINGS[word]]) - color)
     saturation, lightness, white = CHANGES[word]

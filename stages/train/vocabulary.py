@@ -1,15 +1,15 @@
 """Makes the word-vector table of the text encoder; run once by a developer, its result is shipped.
 
 Words are the whole words of MiniLM's own vocabulary plus ours. A word's vector is the embedding of the word in a few
-contexts and of what a dictionary says of it ("taupe: a greyish brown"), so that a rare word lies near the common ones that
-explain it; projected on the directions in which words about materials, colours and objects differ, in 8 bits.
+contexts and of what a dictionary says of it, projected on the directions in which words about materials, colours and objects
+differ, in 8 bits. Words that are never taught, but that the dictionary explains by taught ones, come with those
+(`stages.train.dictionary`).
 Needs the optional extra `vocabulary` (transformers), a folder with sentence-transformers/all-MiniLM-L6-v2 (Apache-2.0) and
 the database files of Princeton WordNet 3.1 (WordNet licence). The SHA-256 of both are recorded in the table.
 """
 
 import re
-from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import Provenance, save_npz, sha256_file
 from stages.prior.text import VOCABULARY
+from stages.train.captions import template_words
 from stages.train.colors import WORDS
+from stages.train.dictionary import INDEX, PARTS, Explainer, Sense, by_word, senses
 from stages.train.substances import FINISHES, FINISHES_METAL, HELD_OUT, OBJECTS, SUBSTANCES
 
 CONTEXTS = ("{}", "{} material", "{} colored texture")
@@ -40,25 +42,23 @@ OWN = ("verdigris", "terracotta", "pewter", "gunmetal", "lacquered", "varnished"
        "celadon", "pistachio", "avocado", "heliotrope", "mulberry", "aubergine", "eggplant", "tangerine", "cinnamon")
 
 
-PARTS = ("data.noun", "data.adj")
-"""Files of WordNet that are read."""
-
-KINDS = ("27", "07", "00", "20", "06")
-"""WordNet's lexicographer files that matter most here: substances, attributes (colours), adjectives, plants, artefacts."""
-
 SENSES = 3
 """Meanings of a word that its vector takes in."""
+
+AMBIGUOUS = frozenset(("ash", "elm", "fir", "foliage", "golden", "horn", "jet", "leafy", "leaves", "metallic", "mossy",
+                       "painted", "pitch", "plant", "plush", "scales", "shell"))  # fmt: skip
+"""Names of substances that a dictionary's text uses in another sense, or of any plant."""
 
 
 def make_vocabulary(model_folder: Path, wordnet: Path, out: Path, size: int = 14000, dims: int = 96) -> None:
     """Write the table.
 
     Args:
-        model_folder: all-MiniLM-L6-v2 as published (model.safetensors, tokenizer.json). wordnet: folder with `PARTS`.
+        model_folder: all-MiniLM-L6-v2 as published (model.safetensors, tokenizer.json). wordnet: with `PARTS` and `INDEX`.
         size: words to keep, those nearest to our topics. dims: length of a vector.
     """
     words = sorted(set(model_words(model_folder)) | set(domain_words()))
-    embedded = word_vectors(model_folder, wordnet, words)  # (W, 384)
+    embedded = word_vectors(model_folder, by_word(senses(wordnet)), words)  # (W, 384)
     domain = np.array([words.index(word) for word in domain_words()])
     closeness = (unit(embedded) @ unit(embedded[domain]).T).max(1)
     closeness[domain] = 2.0
@@ -68,50 +68,40 @@ def make_vocabulary(model_folder: Path, wordnet: Path, out: Path, size: int = 14
     vectors = unit(vectors[keep])
     scale = np.abs(vectors).max() / 127
     arrays = {
-        "words": np.array([words[i] for i in keep]).astype("S"),
+        "words": as_text(words[i] for i in keep),
         "vectors": np.round(vectors / scale).astype(np.int8),
         "scale": np.array(scale, "f4"),
+        "explained": as_text(" ".join((word, *told)) for word, told in explanations(wordnet).items()),
     }
-    arrays["words"] = np.frombuffer(b"\n".join(arrays["words"].tolist()), np.uint8).copy()
     source = {"model": sha256_file(model_folder / "model.safetensors")}
-    source |= {part: sha256_file(wordnet / part) for part in PARTS}
+    source |= {part: sha256_file(wordnet / part) for part in (*PARTS, INDEX)}
     save_npz(out, VOCABULARY, arrays, Provenance({"size": size, "dims": dims}, None, source))
 
 
-def word_vectors(model_folder: Path, wordnet: Path, words: list[str]) -> NDArray[np.float32]:
+def as_text(lines: Iterable[str]) -> NDArray[np.uint8]:
+    """ASCII lines as an array of bytes."""
+    return np.frombuffer("\n".join(lines).encode("ascii"), np.uint8).copy()
+
+
+def word_vectors(model_folder: Path, entries: dict[str, list[Sense]], words: list[str]) -> NDArray[np.float32]:
     """(W, 384), about their mean: of the word in `CONTEXTS`, and of its dictionary entry where there is one."""
     contexts = embed(model_folder, [context.format(word) for context in CONTEXTS for word in words])
     alone = centred(contexts.reshape(len(CONTEXTS), len(words), -1).mean(0))
-    entries = dictionary(wordnet)
     told = {i: entry(word, entries[word]) for i, word in enumerate(words) if word in entries}
     alone[list(told)] += centred(embed(model_folder, list(told.values())))
     return unit(alone)
 
 
-def dictionary(wordnet: Path) -> dict[str, list[tuple[str, list[str], str]]]:
-    """The meanings of every word: kind, all words of that meaning, and its explanation; those of `KINDS` first."""
-    entries = defaultdict(list)
-    for part in PARTS:
-        for kind, lemmas, gloss in synsets(wordnet / part):
-            for word in lemmas:
-                entries[word].append((kind, lemmas, gloss))
-    rank = {kind: i for i, kind in enumerate(KINDS)}
-    return {word: sorted(found, key=lambda e: rank.get(e[0], len(KINDS))) for word, found in entries.items()}
+def explanations(wordnet: Path) -> dict[str, tuple[str, ...]]:
+    """Words that are never in a caption, and the taught words that say what they mean."""
+    names = [name for substance in SUBSTANCES for name in substance.names]
+    taught = words_of([*names, *WORDS, *FINISHES, *FINISHES_METAL, *OBJECTS]) | template_words()
+    return Explainer(wordnet, {n for n in names if n.isalpha()} - AMBIGUOUS, taught).all()
 
 
-def synsets(path: Path) -> Iterator[tuple[str, list[str], str]]:
-    """Each meaning in a file of WordNet, without the examples. Source: WordNet's manual page wndb(5WN)."""
-    for line in path.read_text(encoding="utf-8").splitlines():
-        if not line.startswith("  "):  # the licence
-            head, gloss = line.split(" | ", 1)
-            fields = head.split()
-            lemmas = fields[4 : 4 + 2 * int(fields[3], 16) : 2]
-            yield fields[1], [w.split("(")[0].replace("_", " ").lower() for w in lemmas], gloss.split('; "')[0].strip()
-
-
-def entry(word: str, meanings: list[tuple[str, list[str], str]]) -> str:
+def entry(word: str, meanings: list[Sense]) -> str:
     """What the dictionary says of a word, its synonyms included, as one text."""
-    told = (", ".join(w for w in lemmas if w != word) + " " + gloss for _, lemmas, gloss in meanings[:SENSES])
+    told = (", ".join(w for w in sense.words if w != word) + " " + sense.gloss for sense in meanings[:SENSES])
     return f"{word}: " + ". ".join(told)
 
 
@@ -119,7 +109,12 @@ def domain_words() -> list[str]:
     """Every word of our captions and of the list above, sorted."""
     phrases = [name for substance in SUBSTANCES for name in substance.names]
     phrases += [*WORDS, *FINISHES, *FINISHES_METAL, *OBJECTS, *TOPICS, *OWN, *(word for word, _ in HELD_OUT)]
-    return sorted({word for phrase in phrases for word in re.findall("[a-z]+", phrase.lower())})
+    return sorted(words_of(phrases))
+
+
+def words_of(phrases: list[str]) -> set[str]:
+    """The single words of phrases."""
+    return {word for phrase in phrases for word in re.findall("[a-z]+", phrase.lower())}
 
 
 def model_words(folder: Path) -> list[str]:

@@ -7,6 +7,9 @@ from stages.prior.model import VOCABULARY_FILE
 from stages.prior.patterns import PATTERNS
 from stages.prior.recipe import LAYOUTS
 from stages.prior.text import MAX_WORDS, Reading, TextEmbedding, TextEncoder, Vocabulary, split_words
+from stages.train.captions import template_words
+from stages.train.colors import COLORS
+from stages.train.substances import OBJECTS, SUBSTANCES
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +63,23 @@ def test_word_vectors_are_unit_and_words_are_sorted(vocabulary: Vocabulary) -> N
 def test_prompts_are_split_without_articles_accents_and_case() -> None:
     assert split_words("A Rosé-Gold statue, of the 1st CLASS!") == ["rose", "gold", "statue", "st", "class"]
     assert split_words("") == []
+
+
+def test_a_word_that_was_never_taught_is_read_as_what_explains_it() -> None:
+    told = Vocabulary(["grey", "violet"], np.eye(2, dtype=np.float32), {"mauve": ["grey", "violet"], "violette": ["violet"]})
+    assert told.read("A mauve vase") == ["grey", "violet", "vase"]
+    assert told.read("mauves, violet") == ["grey", "violet"]  # no word twice
+    assert told.read("violette " * 30) == ["violet"]
+
+
+def test_words_of_captions_are_read_as_they_are(vocabulary: Vocabulary) -> None:
+    """The shipped explanations touch no word that training uses, such as "base" or "spots"."""
+    names = [name for substance in SUBSTANCES for name in substance.names]
+    taught = template_words() | {word for text in (*names, *COLORS, *OBJECTS) for word in split_words(text)}
+    assert not taught & set(vocabulary.explained)
+    prompt = "oak base and gold top with white spots"
+    assert vocabulary.read(prompt) == split_words(prompt)
+    assert vocabulary.read("mauve fabric")[-2:] == ["violet", "fabric"]
 
 
 def test_long_prompts_are_cut(vocabulary: Vocabulary) -> None:
