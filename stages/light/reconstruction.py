@@ -27,10 +27,6 @@ TOLERANCE = 12.0
 """A neighbour counts for nothing when its squared difference exceeds this many times the sum of both variances; its own
 is taken for no more than the point's, so that noise does not flow to where there is none."""
 
-JOINT = 8.0
-"""Of sums that share their weights a neighbour counts for nothing when its squared differences exceed this many times what
-noise explains, on average over them."""
-
 TOGETHER = 8.0
 """Nor does it count when the squared differences of the first sum, diffuse light, exceed this many times what noise explains,
 on average over all lights and colours: what stands in the way of one light stands in the way of others."""
@@ -208,7 +204,7 @@ def _alike_together(mean, noise, channels, p, q):  # type: ignore[no-untyped-def
 
 @fast
 def _share(unlike, shared, together):  # type: ignore[no-untyped-def]
-    """Give the joint sums what they are unlike on average, channel by channel, in place. unlike: (sums, channels)."""
+    """Give joint sums what they are unlike on average, channel by channel, in place. unlike: (sums, channels)."""
     together[:] = 0
     count = 0
     for k in range(len(shared)):
@@ -216,11 +212,11 @@ def _share(unlike, shared, together):  # type: ignore[no-untyped-def]
             count += 1
             for c in range(len(together)):
                 together[c] += unlike[k, c]
-    scale = np.float32(TOLERANCE / JOINT) / np.float32(max(count, 1))
+    share = np.float32(1) / np.float32(max(count, 1))
     for k in range(len(shared)):
         if shared[k]:
             for c in range(len(together)):
-                unlike[k, c] = together[c] * scale
+                unlike[k, c] = together[c] * share
 
 
 @fast
