@@ -20,7 +20,7 @@ from stages.light.textured_model import TexturedModel
 PIXELS = 1024
 """Pixels a step for each image of the batch: many small steps get further in a given time than few large ones."""
 
-BUDGET = Budget(steps=10_000, learning_rate=0.02)
+BUDGET = Budget(steps=16_000, learning_rate=0.02)
 
 MAX_MISSED = 0.05
 """With a larger share of points off the reference's surface the two are taken for different shapes."""
