@@ -13,6 +13,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 import resource
 import time
 import zipfile
@@ -117,7 +118,8 @@ def reason(error: OSError) -> str:
 def written_atomically(path: Path) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it on success, remove it on any failure.
 
-    The temporary name keeps the suffix, since some writers choose the format by it.
+    The temporary name keeps the suffix, since some writers choose the format by it. What a killed run left of this
+    very file is removed first; should that run be alive after all, its rename fails with an error of its own.
 
     Raises: OutputError with the cause when the file system refuses.
     """
@@ -125,6 +127,10 @@ def written_atomically(path: Path) -> Iterator[Path]:
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.tmp{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        leftover = re.compile(rf"\.{re.escape(path.stem)}\.\d+\.tmp{re.escape(path.suffix)}")
+        for beside in path.parent.iterdir():
+            if leftover.fullmatch(beside.name):
+                beside.unlink(missing_ok=True)
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
