@@ -3,8 +3,11 @@
 import torch
 from torch import Tensor
 
-from stages.core.color import srgb_encode
+from stages.core.color import luminance, srgb_decode, srgb_encode
 from stages.core.shading import Material
+
+DIM = 0.05
+"""Irradiance, and albedo, at which the logarithmic scale turns linear: as a share of the mean light, and absolute."""
 
 REACH = 0.05
 """Standard deviation of the smoothness loss's displacement, world units. Source: Zhang et al. 2024, DreamMat, Section 3.3."""
@@ -40,3 +43,18 @@ def distance(material: Material, expected: Tensor) -> Tensor:
         expected: (P, 5) sRGB albedo, roughness, metallic.
     """
     return (encoded(material.columns()) - expected).square().sum(1).mean()
+
+
+def baked_light(material: Material, expected: Tensor, irradiance: Tensor) -> Tensor:
+    """How much of what departs from an expected albedo follows the light: the variance that log irradiance explains.
+
+    Differentiable in: material.
+
+    Args:
+        expected: (P, 5) sRGB albedo, roughness, metallic. irradiance: (P, 3) linear, of any scale.
+    """
+    departure = torch.log((luminance(material.albedo) + DIM) / (luminance(srgb_decode(expected[:, :3])) + DIM))
+    light = luminance(irradiance)
+    light = torch.log(light / light.mean().clamp(min=1e-9) + DIM)
+    light = light - light.mean()
+    return (departure * light).mean().square() / light.square().mean().clamp(min=1e-6)

@@ -28,11 +28,14 @@ from stages.distill.optimizer import RowAdam
 from stages.distill.options import DistillOptions
 from stages.distill.preview import write_preview
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
-from stages.distill.start import Start, fit
+from stages.distill.start import DRAWS, Start, fit, least_like_light
 from stages.distill.views import Views
 
 SEEN_BY = 3
 """A surface point is taken to be seen by one view in this many."""
+
+UNLIT = 10.0
+"""Weight of light in what departs from the expected material, in that of any departure."""
 
 POOL = 2**32
 """In place of a step's number where a pool of pixels is chosen: no step has it."""
@@ -123,7 +126,9 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
 
     model = load_prior(device)
     sampler = CropSampler(views, model.size, options.batch, device, options.lights)
-    recipe = model.read([options.prompt]).recipe(0, np.random.default_rng(options.seed))
+    reading, dice = model.read([options.prompt]), np.random.default_rng(options.seed)
+    draws = [reading.recipe(0, dice) for _ in range(DRAWS)]
+    recipe = least_like_light(draws, views, step_generator(options.seed, POOL))
     return prior.PriorGuidance(model, sampler, options, Start(recipe, views, step_generator(options.seed, POOL)))
 
 
@@ -226,6 +231,7 @@ def _regularizers(material: Material, nearby: Material | None, sample: Sample, r
     if expected is not None:  # words decide what a picture leaves open; a known target needs no such help
         losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(material.metallic))
         losses.append(options.anchor * regularizers.distance(material, expected))
+        losses.append(options.anchor * UNLIT * regularizers.baked_light(material, expected, sample.transport.E))
     if nearby is not None:
         losses.append(options.smoothness * regularizers.smoothness(material, nearby))
     return losses

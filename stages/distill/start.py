@@ -10,6 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from stages.core.baked_light import light_correlation
 from stages.core.convexity import SurfaceSamples
 from stages.core.field import MaterialField
 from stages.core.progress import Progress
@@ -17,7 +18,10 @@ from stages.distill.optimizer import RowAdam
 from stages.distill.regularizers import encoded
 from stages.distill.sampling import even_chance
 from stages.distill.views import Views
-from stages.prior.recipe import Recipe, Surface
+from stages.prior.recipe import BOUND, Recipe, Surface
+
+DRAWS, LIT_VIEWS, LIT_POINTS = 24, 12, 6000
+"""Draws of a prompt's recipe, and the views and points at which they are held against the light."""
 
 SAMPLES = 16_000
 """Surface points that tell edges from creases."""
@@ -59,9 +63,7 @@ class Relief:
 
     def __init__(self, views: Views, generator: torch.Generator) -> None:
         surface = random_points(views, views.seen, 8 * SAMPLES, generator)
-        chance = even_chance(surface[0], 4 * views.pixel_size())
-        u = torch.rand(SAMPLES, generator=generator, dtype=torch.float64)
-        chosen = torch.searchsorted(chance, u).clamp(max=len(chance) - 1)
+        chosen = spread_evenly(surface[0], SAMPLES, views, generator)
         points, normals = (t[chosen].numpy() for t in surface)
         self._samples = SurfaceSamples(points)
         low, high = np.quantile(self._samples.convexity(points, normals), (RELIEF, 1 - RELIEF))
@@ -73,12 +75,55 @@ class Relief:
         return (found * np.where(found < 0, *self._gain)).astype(np.float32)
 
 
+def least_like_light(draws: list[Recipe], views: Views, generator: torch.Generator) -> Recipe:
+    """Of several draws of a recipe, the one whose patterns follow the light least: wide ones do by chance, and then pass for it.
+
+    What lies where the surface says, such as moss in crevices, may follow the light; there each coat is judged by itself.
+    """
+    chosen = views.seen[:: -(-len(views.seen) // LIT_VIEWS)]
+    rows = random_rows(views, chosen, 8 * LIT_POINTS, generator)
+    points, normals = surface_at(views, rows)
+    lights = range(len(views.environments))
+    light = torch.cat([sum(views.transport(view, e).E[some].float() for e in lights) for view, some in rows])
+    even = spread_evenly(points, LIT_POINTS, views, generator)
+    point, normal, irradiance = (t[even].numpy() for t in (points, normals, light))
+    flat = np.zeros(len(point), np.float32)
+    surface = Surface(point, normal, convexity=flat, occlusion=flat)
+
+    def likeness(recipe: Recipe) -> float:
+        bound = recipe.layout is not None and recipe.layout.kind in BOUND
+        parts = recipe.coats if bound else (recipe,)
+        return max(abs(light_correlation(part.evaluate(surface)[:, :3], irradiance)) for part in parts)
+
+    return min(draws, key=likeness)
+
+
+Rows = list[tuple[int, Tensor]]
+"""Views with the rows (K,) of some of their object pixels."""
+
+
+def random_rows(views: Views, chosen: list[int], count: int, generator: torch.Generator) -> Rows:
+    """About `count` random pixels of the chosen views."""
+    share = -(-count // len(chosen))
+    return [(view, torch.randint(len(views.pixels(view)), (share,), generator=generator)) for view in chosen]
+
+
+def surface_at(views: Views, rows: Rows) -> tuple[Tensor, Tensor]:
+    """Points and normals of pixels, (P, 3) each."""
+    surfaces = [views.surface(view, chosen.numpy()) for view, chosen in rows]
+    return torch.cat([s.points for s in surfaces]), torch.cat([s.normals for s in surfaces])
+
+
 def random_points(views: Views, chosen: list[int], count: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
     """Points and normals of about `count` random pixels of the chosen views, (P, 3) each."""
-    share = -(-count // len(chosen))
-    rows = [torch.randint(len(views.pixels(view)), (share,), generator=generator).numpy() for view in chosen]
-    surfaces = [views.surface(view, r) for view, r in zip(chosen, rows, strict=True)]
-    return torch.cat([s.points for s in surfaces]), torch.cat([s.normals for s in surfaces])
+    return surface_at(views, random_rows(views, chosen, count, generator))
+
+
+def spread_evenly(points: Tensor, count: int, views: Views, generator: torch.Generator) -> Tensor:
+    """(count,) of the points (P, 3), drawn so that they lie evenly on the surface, however many views saw each part."""
+    chance = even_chance(points, 4 * views.pixel_size())
+    u = torch.rand(count, generator=generator, dtype=torch.float64)
+    return torch.searchsorted(chance, u).clamp(max=len(chance) - 1)
 
 
 def fit(field: MaterialField, start: Start, views: Views, generator: torch.Generator, progress: Progress) -> None:

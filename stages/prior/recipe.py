@@ -17,6 +17,9 @@ from stages.prior.patterns import DARK_BELOW, LEVEL, PATTERNS, average, fbm, noi
 LAYOUTS = ("none", "edges", "top", "spots", "stripes", "patches", "crevices")
 """Ways to lay a second coat over the first."""
 
+BOUND = ("edges", "top", "crevices")
+"""Those that the surface decides, not chance."""
+
 
 @dataclass(frozen=True)
 class Surface:

@@ -7,11 +7,6 @@ from numpy.typing import NDArray
 from scipy import stats
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from stages.core.color import luminance
-
-DARKEST = 1e-4
-"""Added to albedo and irradiance before the logarithm."""
-
 BIMODAL = (0.15, 0.85)
 """Metallic under the first or over the second counts as decided."""
 
@@ -22,14 +17,6 @@ CONFIDENCE = 0.95
 def color_difference(found: NDArray, true: NDArray) -> float:
     """CIEDE2000 between two sRGB colours (3,)."""
     return float(deltaE_ciede2000(rgb2lab(found.clip(0, 1)[None]), rgb2lab(true[None]))[0])
-
-
-def light_correlation(albedo: NDArray, irradiance: NDArray) -> float:
-    """Correlation over points of log albedo luminance with log irradiance; 0 where either does not vary. (P, 3) linear."""
-    a, e = (np.log(luminance(x.astype(np.float64)) + DARKEST) for x in (albedo, irradiance))
-    if a.std() < 1e-6 or e.std() < 1e-6:
-        return 0.0
-    return float(np.corrcoef(a, e)[0, 1])
 
 
 def decided(metallic: NDArray) -> float:

@@ -23,6 +23,7 @@ from stages.bake.stage import bake
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import conditions, read_lights
 from stages.core.artifact import load_npz
+from stages.core.baked_light import light_correlation
 from stages.core.color import reinhard, srgb_decode, srgb_encode
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
@@ -181,11 +182,10 @@ def plan(options: PriorReportOptions, meshes: dict[str, float]) -> Iterable[Run]
     for seed in range(options.seeds):
         yield from (Run(prompt, mesh, seed) for prompt, mesh in placed)
     if options.ladder:
-        for seed in range(options.seeds):
-            for prompt, mesh in placed:
-                if prompt in IDENTIFIED:
-                    yield from (Run(prompt, mesh, seed, given, alone=True) for given in GIVEN)
-                    yield Run(prompt, mesh, seed, lights="one", alone=True)
+        for prompt, mesh in placed:
+            if prompt in IDENTIFIED:
+                yield from (Run(prompt, mesh, 0, given, alone=True) for given in GIVEN)
+                yield Run(prompt, mesh, 0, lights="one", alone=True)
 
 
 def carry_out(run: Run, out: Path, options: PriorReportOptions) -> Baked:
@@ -212,7 +212,7 @@ def measure(run: Run, baked: Baked, lights: list[Environment]) -> Row:
         rows = np.sort(np.random.default_rng(0).choice(len(maps), min(POINTS, len(maps)), replace=False))
         points = loose_points(baked, rows)
         irradiance = sum(t.E for t in light_transport(baked.scene, points, lights, RAYS, 0))
-        correlation = measures.light_correlation(maps[rows, :3], irradiance.numpy())  # type: ignore[union-attr]
+        correlation = light_correlation(maps[rows, :3], irradiance.numpy())  # type: ignore[union-attr]
         relit = relight(baked, points, maps[rows], wanted)
     truths = np.stack([p.meaning.row() for p in IDENTIFIED])
     own = run.prompt in IDENTIFIED and IDENTIFIED[measures.nearest(found, truths)] == run.prompt

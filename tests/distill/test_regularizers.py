@@ -38,3 +38,20 @@ def test_distance_is_squared_and_sees_albedo_as_srgb() -> None:
     assert float(regularizers.distance(material(0.5), expected)) < 1e-12
     expected[:, 3] += 0.1
     torch.testing.assert_close(regularizers.distance(material(0.5), expected), torch.tensor(0.01))
+
+
+def test_baked_light_is_the_departure_that_follows_the_light() -> None:
+    generator = torch.Generator().manual_seed(0)
+    light = torch.rand(2000, 1, generator=generator).exp() * torch.ones(3)
+    texture = 0.2 + 0.3 * torch.rand(2000, 1, generator=generator) * torch.ones(3)
+    expected = torch.cat([srgb_encode(texture), torch.full((2000, 2), 0.5)], 1)
+
+    def loss(albedo: torch.Tensor) -> float:
+        values = torch.full((2000,), 0.5)
+        return float(regularizers.baked_light(Material(albedo, values, values), expected, light))
+
+    assert loss(texture) < 1e-10  # a texture is no departure
+    even, lit = loss(texture * 1.2), loss(texture * (light / light.mean()) ** 0.5)
+    assert lit > 50 * even
+    dark = regularizers.baked_light(material(0.3), torch.full((5, 5), 0.5), torch.zeros(5, 3))
+    assert float(dark) == 0  # where no light falls, none is baked in

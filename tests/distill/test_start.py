@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 import torch
 
+from stages.core.baked_light import light_correlation
 from stages.core.field import FieldConfig, MaterialField
 from stages.core.progress import silent
 from stages.distill.regularizers import encoded
-from stages.distill.start import Start, fit, random_points
+from stages.distill.start import DRAWS, Start, fit, least_like_light, random_points
 from stages.distill.views import Views
 from stages.prior.recipe import Recipe, draw_coat, draw_layout
-from tests.distill.examples import write_conditions
+from tests.distill.examples import LIGHTS, write_conditions
 
 GREY, GOLD = np.array([0.5, 0.5, 0.5, 0.6, 0.0]), np.array([0.95, 0.85, 0.55, 0.2, 1.0])
 
@@ -81,3 +82,17 @@ def test_a_start_is_a_function_of_the_place(views: Views) -> None:
     points, normals = random_points(views, views.seen, 100, seeded())
     order = torch.randperm(len(points), generator=seeded())
     assert torch.equal(start(points[order], normals[order]), start(points, normals)[order])
+
+
+def test_of_several_draws_the_one_least_like_light_is_taken(views: Views) -> None:
+    """Drawn blindly, wide patterns follow the light by chance: each of two sets of draws ends far under its mean."""
+    points, normals = random_points(views, views.seen, 4000, seeded(5))
+    light = sum((0.6 + normals.numpy() @ towards[:, None] / 3) * colour for towards, colour in LIGHTS.values())
+
+    def likeness(chosen: Recipe) -> float:
+        return abs(light_correlation(Start(chosen, views, seeded())(points, normals)[:, :3].numpy(), light))
+
+    for first in (0, 100):
+        draws = [recipe(seed=first + i) for i in range(DRAWS)]
+        mean = np.mean([likeness(draw) for draw in draws])
+        assert likeness(least_like_light(draws, views, seeded())) < 0.5 * mean

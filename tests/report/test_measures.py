@@ -13,15 +13,6 @@ def test_color_difference_is_ciede2000() -> None:
     assert 3 < measures.color_difference(grey, lighter) < 6
 
 
-def test_light_correlation_sees_what_is_baked() -> None:
-    generator = np.random.default_rng(0)
-    irradiance = np.exp(generator.normal(size=(5000, 1))) * np.ones(3)
-    free = 0.2 + 0.5 * generator.random((5000, 1)) * np.ones(3)
-    assert abs(measures.light_correlation(free, irradiance)) < 0.05
-    assert measures.light_correlation(free * irradiance, irradiance) > 0.8
-    assert measures.light_correlation(np.full((10, 3), 0.5), irradiance[:10]) == 0
-
-
 def test_decided_and_nearest() -> None:
     assert measures.decided(np.array([0.0, 0.1, 0.5, 0.9])) == 0.75
     assert measures.nearest(np.array([0.9, 0.1]), np.array([[0.0, 0], [1, 0], [0, 1]])) == 1

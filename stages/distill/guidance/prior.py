@@ -21,9 +21,9 @@ from stages.distill.start import Start
 from stages.prior.model import Prior
 from stages.prior.text import TextEmbedding
 
-BUDGET = Budget(steps=1500, learning_rate=0.01)
+BUDGET = Budget(steps=250, learning_rate=0.01)
 
-OWN = Weights(eta1=2.5, eta2=(0.0, 0.0), posterior=0.5)
+OWN = Weights(eta1=0.5, eta2=(0.0, 0.0), posterior=1.0)
 """What `--loss csd` means for this model."""
 
 
