@@ -1,4 +1,4 @@
-"""Transfer curves. Everything inside the program is linear Rec. 709; a curve is applied where a file or a model asks.
+"""Transfer curves, and luminance. Inside the program all is linear Rec. 709; a curve is applied where a file or model asks.
 
 Curves work on NumPy arrays and torch tensors alike, element by element, and keep dtype and device.
 """
@@ -38,3 +38,18 @@ def luminance(rgb: Array) -> Array:
     """Rec. 709 luminance of linear RGB. Args: rgb (..., 3). Returns: (...)."""
     r, g, b = LUMINANCE
     return r * rgb[..., 0] + g * rgb[..., 1] + b * rgb[..., 2]
+
+
+DARKEST = 1e-4
+"""Added to luminance before its logarithm."""
+
+
+def log_correlation(one: np.ndarray, other: np.ndarray) -> float:
+    """Correlation over points of the log luminances of two colours, (P, 3) linear; 0 where either does not vary.
+
+    Of albedo and irradiance it tells how much light is baked in.
+    """
+    a, b = (np.log(luminance(x.astype(np.float64)) + DARKEST) for x in (one, other))
+    if a.std() < 1e-6 or b.std() < 1e-6:
+        return 0.0
+    return float(np.corrcoef(a, b)[0, 1])

@@ -10,7 +10,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from stages.core.baked_light import light_correlation
+from stages.core.color import log_correlation
 from stages.core.convexity import SurfaceSamples
 from stages.core.field import MaterialField
 from stages.core.progress import Progress
@@ -76,15 +76,14 @@ class Relief:
 
 
 def least_like_light(draws: list[Recipe], views: Views, generator: torch.Generator) -> Recipe:
-    """Of several draws of a recipe, the one whose patterns follow the light least: wide ones do by chance, and then pass for it.
+    """Of several draws of a recipe, the one whose patterns follow the light least. Wide ones do by chance, and pass for it.
 
     What lies where the surface says, such as moss in crevices, may follow the light; there each coat is judged by itself.
     """
     chosen = views.seen[:: -(-len(views.seen) // LIT_VIEWS)]
     rows = random_rows(views, chosen, 8 * LIT_POINTS, generator)
     points, normals = surface_at(views, rows)
-    lights = range(len(views.environments))
-    light = torch.cat([sum(views.transport(view, e).E[some].float() for e in lights) for view, some in rows])
+    light = torch.cat([_irradiance(views, view, some) for view, some in rows])
     even = spread_evenly(points, LIT_POINTS, views, generator)
     point, normal, irradiance = (t[even].numpy() for t in (points, normals, light))
     flat = np.zeros(len(point), np.float32)
@@ -93,9 +92,14 @@ def least_like_light(draws: list[Recipe], views: Views, generator: torch.Generat
     def likeness(recipe: Recipe) -> float:
         bound = recipe.layout is not None and recipe.layout.kind in BOUND
         parts = recipe.coats if bound else (recipe,)
-        return max(abs(light_correlation(part.evaluate(surface)[:, :3], irradiance)) for part in parts)
+        return max(abs(log_correlation(part.evaluate(surface)[:, :3], irradiance)) for part in parts)
 
     return min(draws, key=likeness)
+
+
+def _irradiance(views: Views, view: int, rows: Tensor) -> Tensor:
+    """(K, 3) of some pixels of a view, under all lights together."""
+    return torch.stack([views.transport(view, e).E[rows].float() for e in range(len(views.environments))]).sum(0)
 
 
 Rows = list[tuple[int, Tensor]]

@@ -23,8 +23,7 @@ from stages.bake.stage import bake
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import conditions, read_lights
 from stages.core.artifact import load_npz
-from stages.core.baked_light import light_correlation
-from stages.core.color import reinhard, srgb_decode, srgb_encode
+from stages.core.color import log_correlation, reinhard, srgb_decode, srgb_encode
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
 from stages.core.shading import Material, Transport, shade
@@ -88,9 +87,10 @@ class Run:
 class Row:
     """What a run gave. Colours are sRGB; what does not apply to a run is empty.
 
-    decided: share of texels that are metal or not. light_correlation: see `measures`. identified: nearest to its own truth
-    of `prompts.IDENTIFIED`. regions: share of a composition's two regions nearer to their own material. relight_percent:
-    tone-mapped RMSE against the ideal material, under lights never trained on.
+    decided: share of texels that are metal or not. light_correlation: of log albedo and log irradiance. shared_pattern: of log
+    albedo with the first seed's, texel by texel. identified: nearest to its own truth of `prompts.IDENTIFIED`. regions: share
+    of a composition's two regions nearer to their own material. relight_percent: tone-mapped RMSE against the ideal
+    material, under lights never trained on.
     """
 
     prompt: str
@@ -111,6 +111,7 @@ class Row:
     color_difference: float
     light_correlation: float
     relight_percent: float
+    shared_pattern: str
     identified: str
     regions: str
 
@@ -140,7 +141,8 @@ def report_prior(out: Path, options: PriorReportOptions, progress: Progress = si
     lights = list(read_lights(())[0])
     for i, run in enumerate(runs):
         progress(f"prior: {run.prompt.text}", i, len(runs))
-        rows.append(measure(run, carry_out(run, out, options), lights))
+        twin = carry_out(dataclasses.replace(run, seed=0), out, options) if run.seed else None
+        rows.append(measure(run, carry_out(run, out, options), lights, twin))
         write_csv(out / "prior.csv", rows)
     progress("prior", len(runs), len(runs))
     summary = list(summarise(rows))
@@ -200,8 +202,8 @@ def carry_out(run: Run, out: Path, options: PriorReportOptions) -> Baked:
     return read_baked(source / "prep.npz", folder / "material.npz", folder / "asset")
 
 
-def measure(run: Run, baked: Baked, lights: list[Environment]) -> Row:
-    """Everything of one run."""
+def measure(run: Run, baked: Baked, lights: list[Environment], twin: Baked | None) -> Row:
+    """Everything of one run. twin: the same of the first seed."""
     wanted, maps = run.prompt.meaning.row(), baked.maps
     colors = srgb_encode(maps[:, :3])
     found = np.r_[colors.mean(0), maps[:, 3:].mean(0)]
@@ -212,7 +214,7 @@ def measure(run: Run, baked: Baked, lights: list[Environment]) -> Row:
         rows = np.sort(np.random.default_rng(0).choice(len(maps), min(POINTS, len(maps)), replace=False))
         points = loose_points(baked, rows)
         irradiance = sum(t.E for t in light_transport(baked.scene, points, lights, RAYS, 0))
-        correlation = light_correlation(maps[rows, :3], irradiance.numpy())  # type: ignore[union-attr]
+        correlation = log_correlation(maps[rows, :3], irradiance.numpy())  # type: ignore[union-attr]
         relit = relight(baked, points, maps[rows], wanted)
     truths = np.stack([p.meaning.row() for p in IDENTIFIED])
     own = run.prompt in IDENTIFIED and IDENTIFIED[measures.nearest(found, truths)] == run.prompt
@@ -236,6 +238,7 @@ def measure(run: Run, baked: Baked, lights: list[Environment]) -> Row:
         color_difference=measures.color_difference(found[:3], wanted[:3]),
         light_correlation=correlation,
         relight_percent=relit,
+        shared_pattern="" if twin is None else f"{log_correlation(maps[:, :3], twin.maps[:, :3]):.3f}",
         identified=str(own) if run.prompt in IDENTIFIED else "",
         regions="" if run.prompt.top is None else f"{regions_right(run.prompt, baked, colors):.2f}",
     )
@@ -316,6 +319,8 @@ def summarise(rows: list[Row]) -> Iterable[Summary]:
         yield line("baked light, |correlation|", label, of, "")
     yield line("baked light, |correlation|", "one material", [abs(r.light_correlation) for r in one], "<= 0.10")
     yield line("two seeds, distance of means", "all", distances(full), "")
+    shared = [abs(float(r.shared_pattern)) for r in one if r.shared_pattern]
+    yield line("two seeds, |correlation| of patterns", "one material", shared, "")
 
 
 def distances(rows: list[Row]) -> list[float]:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from stages.core.baked_light import light_correlation
+from stages.core.color import log_correlation
 from stages.core.field import FieldConfig, MaterialField
 from stages.core.progress import silent
 from stages.distill.regularizers import encoded
-from stages.distill.start import DRAWS, Start, fit, least_like_light, random_points
+from stages.distill.start import DRAWS, Start, fit, least_like_light, random_points, spread_evenly
 from stages.distill.views import Views
 from stages.prior.recipe import Recipe, draw_coat, draw_layout
 from tests.distill.examples import LIGHTS, write_conditions
@@ -86,11 +86,13 @@ def test_a_start_is_a_function_of_the_place(views: Views) -> None:
 
 def test_of_several_draws_the_one_least_like_light_is_taken(views: Views) -> None:
     """Drawn blindly, wide patterns follow the light by chance: each of two sets of draws ends far under its mean."""
-    points, normals = random_points(views, views.seen, 4000, seeded(5))
+    points, normals = random_points(views, views.seen, 16_000, seeded(5))
+    even = spread_evenly(points, 4000, views, seeded(6))
+    points, normals = points[even], normals[even]
     light = sum((0.6 + normals.numpy() @ towards[:, None] / 3) * colour for towards, colour in LIGHTS.values())
 
     def likeness(chosen: Recipe) -> float:
-        return abs(light_correlation(Start(chosen, views, seeded())(points, normals)[:, :3].numpy(), light))
+        return abs(log_correlation(Start(chosen, views, seeded())(points, normals)[:, :3].numpy(), light))
 
     for first in (0, 100):
         draws = [recipe(seed=first + i) for i in range(DRAWS)]
