@@ -82,7 +82,7 @@ demo/urn.obj: examples/urn.py | $(VENV)/.ready
 
 demo: demo/urn.obj  ## texture a mesh made by the project itself, from nothing to demo/asset
 	@printf 'weathered copper with verdigris in the crevices' > demo/prompt.txt
-	$(MAKE) demo/asset/bake.json CONDITIONS_OPTIONS='--views 32' DISTILL_OPTIONS='--steps 400'
+	$(MAKE) demo/asset/bake.json CONDITIONS_OPTIONS='--views 32'
 	@echo "look at demo/asset/preview.png; the model is demo/asset/model.glb"
 
 asset: $(VENV)/.ready  ## one mesh and prompt: make asset MESH=chair.obj PROMPT="a carved oak chair"

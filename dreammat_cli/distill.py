@@ -6,7 +6,7 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
-from stages.distill.options import GIVEN, LOSSES, DistillOptions
+from stages.distill.options import GIVEN, LOSSES, QUALITY, DistillOptions
 from stages.sd.options import SdOptions
 
 DEFAULT, SD = defaults(DistillOptions), defaults(SdOptions)
@@ -35,8 +35,10 @@ def weight(name: str, text: str) -> Any:
               help="Its light and geometry ControlNet, likewise.")
 @click.option("--vram", type=click.IntRange(8), default=SD["vram"], metavar="GIB",
               help="For --guidance sd: GPU memory to stay within; 8, 12 and 16 save ever less.  [default: what it has]")
+@click.option("--quality", type=click.Choice(list(QUALITY)), default=DEFAULT["quality"], show_default=True,
+              help="A quarter of the steps that the guidance calls for, as many, or four times that.")
 @click.option("--steps", type=click.IntRange(1), default=DEFAULT["steps"], show_default=True, metavar="N",
-              help="Optimiser steps.")
+              help="Optimiser steps, in place of that.")
 @click.option("--batch", type=click.IntRange(1, 256), default=DEFAULT["batch"], show_default=True, metavar="N",
               help="Images a step.")
 @click.option("--learning-rate", type=click.FloatRange(0, 1, min_open=True), default=DEFAULT["learning_rate"],

@@ -8,6 +8,9 @@ from stages.sd.options import SdOptions
 GIVEN = ("none", "geometry", "light", "full")
 LOSSES = ("csd", "sds")
 
+QUALITY = {"draft": 0.25, "standard": 1.0, "high": 4.0}
+"""Steps, as a multiple of what the guidance calls for."""
+
 NEGATIVE_PROMPT = "blurry, low quality, noisy, shadows, highlights, baked lighting"
 
 
@@ -17,7 +20,8 @@ class DistillOptions:
 
     guidance: str = "prior"  # * "prior": the embedded diffusion model; "sd": Stable Diffusion; "reference": a known material
     reference: Path | None = None  # * glTF binary or other textured scene, for the reference guidance
-    steps: int | None = None  # * optimiser steps; None: what the guidance calls for
+    quality: str = "standard"  # * one of QUALITY
+    steps: int | None = None  # * optimiser steps; None: what guidance and quality call for
     batch: int = 1  # * images a step, or that many times PIXELS for the reference
     learning_rate: float | None = None  # * of Adam, at the start; None: what the guidance calls for
     seed: int = 0  # *

@@ -25,7 +25,7 @@ from stages.distill.gauss_newton import logit_gradient, proposal
 from stages.distill.guidance.base import Budget, Guidance, Response
 from stages.distill.leaps import UNTIL, leaps
 from stages.distill.optimizer import RowAdam
-from stages.distill.options import DistillOptions
+from stages.distill.options import QUALITY, DistillOptions
 from stages.distill.preview import write_preview
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
 from stages.distill.start import DRAWS, Start, fit, least_like_light
@@ -83,7 +83,7 @@ def distill(
     device = chosen_device(options)
     views = Views(conditions)
     guidance = make_guidance(options, views, device)
-    budget = Budget(options.steps or guidance.budget.steps, options.learning_rate or guidance.budget.learning_rate)
+    budget = chosen_budget(options, guidance.budget)
     request = _request(options, budget, views, guidance)
     if not force and (done := peek(out, MATERIAL)) and done.same_request(request):
         checkpoint.checkpoint_path(out).unlink(missing_ok=True)
@@ -101,6 +101,12 @@ def distill(
         log |= {"milliseconds_per_step": clock.per_step(state.step - resumed), "steps": state.step, "resumed": resumed}
     checkpoint.checkpoint_path(out).unlink(missing_ok=True)
     return DistillResult(state.step, resumed, state.loss[-1], False)
+
+
+def chosen_budget(options: DistillOptions, called_for: Budget) -> Budget:
+    """What the guidance calls for, where the options do not say otherwise."""
+    steps = options.steps or max(1, round(called_for.steps * QUALITY[options.quality]))
+    return Budget(steps, options.learning_rate or called_for.learning_rate)
 
 
 def make_guidance(options: DistillOptions, views: Views, device: torch.device) -> Guidance:
@@ -283,7 +289,7 @@ def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Gu
     if guidance.weights:
         chosen |= plain_options(guidance.weights)
     chosen["reference"] = options.reference.name if options.reference else None
-    del chosen["sd"]  # its models are known by their hashes
+    del chosen["sd"], chosen["quality"]  # its models are known by their hashes, and it by its steps
     inputs = {"conditions": views.digest, "prep": views.prep, **guidance.inputs}
     extra = {"prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments}
     return Provenance(chosen, options.seed, inputs, extra)

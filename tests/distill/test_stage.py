@@ -15,7 +15,7 @@ from stages.core.field import MaterialField
 from stages.core.schemas import MATERIAL
 from stages.distill import checkpoint, stage
 from stages.distill.guidance import reference
-from stages.distill.guidance.base import Response
+from stages.distill.guidance.base import Budget, Response
 from stages.distill.options import DistillOptions
 from stages.distill.stage import distill
 from stages.distill.views import Views
@@ -52,6 +52,17 @@ def interrupt_at(step: int, action: Callable[[], None]) -> Callable[[str, int, i
 
 def ctrl_c() -> None:
     raise KeyboardInterrupt
+
+
+def test_quality_multiplies_the_steps_and_steps_replace_it() -> None:
+    called_for = Budget(steps=250, learning_rate=0.01)
+
+    def steps(**chosen: object) -> int:
+        return stage.chosen_budget(DistillOptions(**chosen), called_for).steps  # type: ignore[arg-type]
+
+    assert [steps(quality=quality) for quality in ("draft", "standard", "high")] == [62, 250, 1000]
+    assert steps(quality="high", steps=7) == 7
+    assert stage.chosen_budget(DistillOptions(learning_rate=0.5), called_for).learning_rate == 0.5
 
 
 def test_golden(folder: Path, tmp_path: Path, golden: Golden) -> None:
