@@ -132,10 +132,14 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
 
     model = load_prior(device)
     sampler = CropSampler(views, model.size, options.batch, device, options.lights)
-    reading, dice = model.read([options.prompt]), np.random.default_rng(options.seed)
-    draws = [reading.recipe(0, dice) for _ in range(DRAWS)]
-    recipe = least_like_light(draws, views, step_generator(options.seed, POOL))
-    return prior.PriorGuidance(model, sampler, options, Start(recipe, views, step_generator(options.seed, POOL)))
+
+    def begin() -> Start:
+        reading, dice = model.read([options.prompt]), np.random.default_rng(options.seed)
+        draws = [reading.recipe(0, dice) for _ in range(DRAWS)]
+        recipe = least_like_light(draws, views, step_generator(options.seed, POOL))
+        return Start(recipe, views, step_generator(options.seed, POOL))
+
+    return prior.PriorGuidance(model, sampler, options, begin)
 
 
 def _stable_diffusion(options: DistillOptions, views: Views, device: torch.device) -> Guidance:

@@ -63,7 +63,7 @@ def rising(points: Tensor, normals: Tensor) -> Tensor:
 def guidance(views: Views, colour: float, batch: int = 2, **options: Any) -> PriorGuidance:
     chosen = DistillOptions(prompt="flat", negative_prompt="bad", batch=batch, **options)
     sampler = CropSampler(views, SIZE, batch, torch.device("cpu"))
-    return PriorGuidance(FlatPrior(colour), sampler, chosen, rising)  # type: ignore[arg-type]
+    return PriorGuidance(FlatPrior(colour), sampler, chosen, lambda: rising)  # type: ignore[arg-type, return-value]
 
 
 def shown(made: PriorGuidance, seed: int = 0) -> tuple[Any, Tensor, torch.Generator]:

@@ -5,6 +5,8 @@ diffusion time; the score moves the picture. All three branches (prompt, no prom
 conditions, or colours shift. What the words alone call for comes along.
 """
 
+import functools
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -28,16 +30,21 @@ OWN = Weights(eta1=0.5, eta2=(0.0, 0.0), posterior=1.0)
 
 
 class PriorGuidance:
-    """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size; start: what the words alone call for."""
+    """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size; begin: finds what the words call for."""
 
-    def __init__(self, prior: Prior, sampler: CropSampler, options: DistillOptions, start: Start) -> None:
-        self.sampler, self.start = sampler, start
+    def __init__(self, prior: Prior, sampler: CropSampler, options: DistillOptions, begin: Callable[[], Start]) -> None:
+        self.sampler, self._begin = sampler, begin
         self.identity: dict[str, Any] = prior.identity
         self.inputs = {"prior": prior.identity["weights"]}
         self.budget, self.weights = BUDGET, chosen_weights(options, OWN)
         self._prior, self._options = prior, options
         self._positive = {words: prior.embed([f"{options.prompt}, {words}"]) for words in VIEW_WORDS}
         self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
+
+    @functools.cached_property
+    def start(self) -> Start:
+        """Found when first asked for: a run that is up to date never does."""
+        return self._begin()
 
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """See `Guidance.respond`; the number for the curve is the root mean square of the score on the picture."""
