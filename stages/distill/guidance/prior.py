@@ -26,8 +26,9 @@ from stages.prior.text import TextEmbedding
 BUDGET = Budget(steps=250, learning_rate=0.01)
 
 OWN = Weights(eta1=0.5, eta2=(0.0, 0.0), posterior=1.0)
-"""What `--loss csd` means for this model: mostly its posterior mean, which stays where it belongs. The classifier's score alone goes
-past the prompt, most where most light falls: at eta1 2.5 and posterior 0.5, unanchored black rubber ends at 1/30 of its albedo."""
+"""What `--loss csd` means for this model: mostly its posterior mean, which stays where it belongs. The classifier's score by
+itself goes past the prompt, most where most light falls: with 2.5 and 0.5, unanchored black rubber ends at 1/30 of its
+albedo."""
 
 
 class PriorGuidance:
