@@ -145,7 +145,7 @@ def report_prior(out: Path, options: PriorReportOptions, progress: Progress = si
         rows.append(measure(run, carry_out(run, out, options), lights, twin))
         write_csv(out / "prior.csv", rows)
     progress("prior", len(runs), len(runs))
-    summary = list(summarise(rows))
+    summary = [line for line in summarise(rows) if line.runs]
     write_csv(out / "summary.csv", summary)
     shown = [run for run in runs if run.seed == 0 and not run.alone]
     plots.contact_sheet(
