@@ -35,7 +35,7 @@ SEEN_BY = 3
 """A surface point is taken to be seen by one view in this many."""
 
 UNLIT = 10.0
-"""Weight of light in what departs from the expected material, in that of any departure."""
+"""Weight of what departs from the expected material along with the light, as a multiple of the anchor's."""
 
 POOL = 2**32
 """In place of a step's number where a pool of pixels is chosen: no step has it."""
