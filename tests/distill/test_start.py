@@ -85,7 +85,7 @@ def test_a_start_is_a_function_of_the_place(views: Views) -> None:
 
 
 def test_of_several_draws_the_one_least_like_light_is_taken(views: Views) -> None:
-    """Drawn blindly, wide patterns follow the light by chance: each of two sets of draws ends far under its mean."""
+    """Whatever their order, it is one of the best of its set by other points too."""
     points, normals = random_points(views, views.seen, 16_000, seeded(5))
     even = spread_evenly(points, 4000, views, seeded(6))
     points, normals = points[even], normals[even]
@@ -96,5 +96,6 @@ def test_of_several_draws_the_one_least_like_light_is_taken(views: Views) -> Non
 
     for first in (0, 100):
         draws = [recipe(seed=first + i) for i in range(DRAWS)]
-        mean = np.mean([likeness(draw) for draw in draws])
-        assert likeness(least_like_light(draws, views, seeded())) < 0.5 * mean
+        chosen = least_like_light(draws, views, seeded())
+        assert least_like_light(draws[::-1], views, seeded()) is chosen
+        assert likeness(chosen) <= np.quantile([likeness(draw) for draw in draws], 0.25)

@@ -65,7 +65,7 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(prior, name, less)
     ball = tmp_path / "ball.obj"
     trimesh.creation.icosphere(subdivisions=2).export(ball)
-    options = PriorReportOptions(mesh=(str(ball),), seeds=1, prompts=1, steps=2, views=1)
+    options = PriorReportOptions(mesh=(str(ball),), seeds=2, prompts=1, steps=2, views=1)
     lines = prior.report_prior(tmp_path, options)
     with (tmp_path / "prior.csv").open() as stream:
         rows = list(csv.DictReader(stream))
@@ -73,7 +73,10 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         ("full", "all", "False"), ("full", "all", "True"), ("geometry", "all", "True"), ("full", "one", "True"),
     }  # fmt: skip
     assert all(0 <= float(row["decided"]) <= 1 and float(row["relight_percent"]) >= 0 for row in rows if not row["regions"])
+    assert all(bool(row["shared_pattern"]) == (row["seed"] == "1") for row in rows)
+    assert all(-1 <= float(row["shared_pattern"]) < 0.9 for row in rows if row["seed"] == "1"), "another seed, another pattern"
     assert {line.measure for line in lines} >= {"roughness error", "identified, %", "baked light, |correlation|"}
+    assert all(line.runs for line in lines)
     assert (tmp_path / "prior.png").stat().st_size > 10_000
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("material.npz")}
     prior.report_prior(tmp_path, options)
