@@ -4,6 +4,7 @@ Run by its path; needs nothing of this package. stdin: V and F as int64, vertice
 uint32. stdout: UVs (F, 3, 2) float32 in units of length, then the chart (F,) int32 of each face, -1 for none.
 """
 
+import os
 import sys
 
 import numpy as np
@@ -13,7 +14,10 @@ _TEXELS = 256.0  # xatlas packs what it makes; at this size and without gutters 
 
 
 def main() -> None:
-    """Make charts for the mesh on stdin, write them to stdout."""
+    """Make charts for the mesh on stdin, write them to stdout, and end without a clean-up.
+
+    xatlas's own can wait for ever: it wakes its idle threads without their lock, so one about to sleep misses it.
+    """
     request = sys.stdin.buffer.read()
     count, faces = np.frombuffer(request, np.int64, 2)
     vertices = np.frombuffer(request, np.float32, 3 * count, 16).reshape(-1, 3)
@@ -30,6 +34,8 @@ def main() -> None:
     whole = (labels == labels[:, :1]).all(1)
     sys.stdout.buffer.write((uv * size)[corners].astype(np.float32).tobytes())
     sys.stdout.buffer.write(np.where(whole, labels[:, 0], -1).astype(np.int32).tobytes())
+    sys.stdout.flush()
+    os._exit(0)
 
 
 if __name__ == "__main__":

@@ -121,6 +121,22 @@ def test_a_crash_of_xatlas_is_survived(monkeypatch: pytest.MonkeyPatch, tmp_path
     assert unwrap.unwrap(vertices, triangles, np.arange(12), SIZE, PADDING, 5.0).method == "projection: xatlas failed"
 
 
+def test_xatlas_is_not_waited_for_once_it_has_answered(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Its destructor joins threads that may have missed their wake-up; here it never returns."""
+    worker = tmp_path / "worker.py"
+    worker.write_text(
+        "import runpy, time, xatlas\n"
+        "class Atlas(xatlas.Atlas):\n"
+        "    def __del__(self):\n"
+        "        time.sleep(60)\n"
+        "xatlas.Atlas = Atlas\n"
+        f"runpy.run_path({xatlas_worker.__file__!r}, run_name='__main__')\n"
+    )
+    monkeypatch.setattr(xatlas_worker, "__file__", str(worker))
+    made, method = unwrap.run_xatlas(*cube(), 20.0)
+    assert made is not None and method == "xatlas"
+
+
 def test_xatlas_charts_have_their_true_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The worker runs by its path, in any folder, and its rounding to texels of its own is undone."""
     monkeypatch.chdir(tmp_path)
