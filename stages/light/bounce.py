@@ -47,7 +47,7 @@ def blender_light_maps(
         lights = cached_light_set(tuple(some))
         sums = gather(scene, points, lights, quality, seed, near, terms)
         add_bounce(sums, scene, points, lights, Quality(quality.lobe, 0), seed + SEED_STEP, near, terms)
-        maps = torch.from_numpy(light_maps(smoothed(sums, near, terms)))
+        maps = torch.from_numpy(light_maps(smoothed(sums, points, lights, near, terms)))
         result += [maps[..., 3 * e : 3 * e + 3].contiguous() for e in range(len(some))]
     return result
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from stages.core.color import luminance
 from stages.light.environment import Environment, directions_of_texels
+from stages.light.lamps import Lamps, cluster
 from stages.light.octahedral import octahedral, texel_directions
 
 SQUARE = 512
@@ -53,6 +54,7 @@ class LightSet:
     texels, cumulative: of all environments after each other, the excess texels along a Morton curve, on which every
     cell is one stretch, and the running sum of their shares of their environment's energy.
     cells: the squares of FINE / CELLS texels that hold excess.
+    lamps: the excess again, in clusters that are small where it is bright.
     demand: (environments,) how light rays are best shared out: the noise that one ray in each would leave, as a share of the
     environment's mean, for a dim one is exposed longer.
     """
@@ -66,6 +68,7 @@ class LightSet:
     texels: NDArray[np.int32]
     cumulative: NDArray[np.float64]
     cells: "Cells"
+    lamps: Lamps
     demand: NDArray[np.float64]
 
 
@@ -107,7 +110,9 @@ def light_set(environments: list[Environment]) -> LightSet:
     texels, cumulative, cells = _cells(energy)
     shares = np.split(cells.energy, cells.first[1:-1])
     demand = np.array([_demand(*parts) for parts in zip(squares, peaks, shares, strict=True)])
-    return LightSet(tuple(environments), pyramid, start, fine, block, density, texels, cumulative, cells, demand)
+    whole = [luminance(square).mean() + luminance(peak).mean() for square, peak in zip(squares, peaks, strict=True)]
+    lamps = cluster(np.stack(peaks), np.array(whole), CHANNELS)
+    return LightSet(tuple(environments), pyramid, start, fine, block, density, texels, cumulative, cells, lamps, demand)
 
 
 def _demand(residual: NDArray, excess: NDArray, energy: NDArray) -> float:

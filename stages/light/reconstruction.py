@@ -68,7 +68,7 @@ def variance(gap: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
     `gap` may be overwritten.
     """
     flat = _rows(gap)
-    _in_parts(lambda start, end: _variance(flat, near.index, start, end), -(-len(near.index) // BLOCK), 8)
+    in_parts(lambda start, end: _variance(flat, near.index, start, end), -(-len(near.index) // BLOCK), 8)
     return flat.reshape(gap.shape)
 
 
@@ -83,7 +83,7 @@ def merge(into: Estimate, rows: NDArray[np.int64], more: Estimate, share: NDArra
     def part(start: int, end: int) -> None:
         _merge(mean, noise, rows, new_mean, new_noise, share, start, end)
 
-    _in_parts(part, len(rows), POINTS_PER_TASK)
+    in_parts(part, len(rows), POINTS_PER_TASK)
 
 
 def smoothed(
@@ -118,7 +118,7 @@ def _weighted(
     def part(start: int, end: int) -> None:
         _average(flat, noise, values, power, shared, mean.shape[-1], geometry, start, end, result)
 
-    _in_parts(part, len(mean), POINTS_PER_TASK)
+    in_parts(part, len(mean), POINTS_PER_TASK)
     return result.reshape(mean.shape)
 
 
@@ -127,7 +127,8 @@ def _rows(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return values.reshape(len(values), int(np.prod(values.shape[1:])))
 
 
-def _in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
+def in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
+    """Do `work(start, end)` for stretches of `size` that cover 0 to `count`, on all cores."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(lambda start: work(start, min(start + size, count)), range(0, count, size)))
 

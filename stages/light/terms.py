@@ -24,7 +24,8 @@ class Terms:
     roughness: of the glossy lobes. shares: of the lobe rays, the cosine lobe's, then each glossy one's. stored: sums that a
     point keeps, `mirror` among them, the two of roughness 0, which are looked up and not summed. judged: by which noise is
     judged, what a picture of a rough thing is made of. sharp: those that are left as traced, for they show edges that no
-    neighbour knows of. joint: those of which the differences count too, for roughness has a slope. principled: False for
+    neighbour knows of. joint: those of which the differences count too, for roughness has a slope. highlights:
+    glossy lobes whose known highlights are taken out while noise is averaged (`stages.light.lamps`). principled: False for
     glTF's, or weights of Burley's departure from Lambert and of the dielectric's reflection.
     """
 
@@ -35,6 +36,7 @@ class Terms:
     judged: tuple[int, ...]
     sharp: tuple[int, ...]
     joint: tuple[int, ...] = ()
+    highlights: tuple[int, ...] = ()
     principled: tuple[bool, float, float] = (False, 0.0, 0.0)
 
     @property
@@ -46,6 +48,11 @@ class Terms:
     def alphas(self) -> NDArray[np.float32]:
         """Of the glossy lobes."""
         return np.array([alpha_from_roughness(r) for r in self.roughness], np.float32)
+
+    def places_of_highlights(self) -> NDArray[np.int64]:
+        """Of the lobes with highlights: the stored places of their first sums, then of their second ones."""
+        first = 1 + np.array(self.highlights, np.int64)
+        return self.summed[np.concatenate([first, first + len(self.roughness)])]
 
     def counts(self, total: int) -> NDArray[np.int64]:
         """Rays of the cosine lobe and of each glossy one: an even number, for two halves, and not 0."""
@@ -81,6 +88,7 @@ GLTF = Terms(
     judged=(0, 1 + KNOTS.index(0.5), 1 + KNOTS.index(1.0)),
     sharp=(2, 2 + _K),
     joint=(*range(3, 1 + _K), *range(3 + _K, 1 + 2 * _K)),
+    highlights=tuple(range(KNOTS.index(0.16) - 1, KNOTS.index(0.65))),
 )
 """E, A at every knot, B at every knot."""
 

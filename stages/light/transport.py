@@ -15,7 +15,8 @@ every term, every roughness and every environment:
 - what rises above the bound (a sun, a lamp) has rays of its own, aimed at what the point would reflect most of, and
   combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles;
 - neighbouring pixels use complementary samples; the points that turn out noisiest trace more; and what noise is left is
-  averaged over neighbours that do not differ by more than it (`stages.light.reconstruction`).
+  averaged over neighbours that do not differ by more than it (`stages.light.reconstruction`), less the highlights that a
+  lamp would make in the open (`stages.light.lamps`), which averaging would flatten.
 
 These errors fall as rays are added. What stays is the resolution of the lights, 0.4 degrees (`stages.light.light_set`), under
 what roughness 0.08 spreads; a mirror looks up the light itself. The result depends on seed and pixel only, not on threads.
@@ -37,7 +38,7 @@ from stages.core.albedo import MIN_COSINE
 from stages.core.brdf import alpha_from_roughness
 from stages.core.frames import tangent_frame
 from stages.core.shading import KNOTS, Transport
-from stages.light import reconstruction
+from stages.light import lamps, reconstruction
 from stages.light.environment import Environment, lookup
 from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
@@ -79,7 +80,7 @@ EVEN = 0.35
 
 QUALITY = {"draft": Quality(19, 9), "standard": Quality(38, 18), "high": Quality(304, 144)}
 
-AIM = np.array([alpha_from_roughness(r) for r in (0.5, 1.0)], np.float32)
+AIM = np.array([alpha_from_roughness(r) for r in (0.33, 1.0)], np.float32)
 """Glossy lobes that light rays are aimed for, beside the diffuse one."""
 
 
@@ -127,7 +128,7 @@ def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality,
     """`light_transport` for lights that are already split."""
     near = reconstruction.Neighbours.of(points)
     sums = gather(scene, points, lights, quality, seed, near)
-    mean = smoothed(sums, near) if quality.smooth else sums.mean
+    mean = smoothed(sums, points, lights, near) if quality.smooth else sums.mean
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
     return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
 
@@ -156,10 +157,16 @@ def gather(
     return sums
 
 
-def smoothed(sums: Sums, near: reconstruction.Neighbours, terms: Terms = GLTF) -> NDArray[np.float32]:
-    """The sums with their noise averaged away, (P, stored, CHANNELS); forgets the variance of the sharp ones."""
+def smoothed(
+    sums: Sums, points: GBuffer, lights: LightSet, near: reconstruction.Neighbours, terms: Terms = GLTF
+) -> NDArray[np.float32]:
+    """The sums with their noise averaged away, (P, stored, CHANNELS); uses up the sums it is given."""
     sums.variance[:, terms.sharp] = 0
-    return reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
+    places = terms.places_of_highlights()
+    kept = lamps.take_out(sums.mean, points, lights.lamps, terms.alphas[list(terms.highlights)], places)
+    result = reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
+    lamps.put_back(result, sums.mean, kept, places)
+    return result
 
 
 def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
