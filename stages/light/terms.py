@@ -25,7 +25,7 @@ class Terms:
     point keeps, `mirror` among them, the two of roughness 0, which are looked up and not summed. judged: by which noise is
     judged, what a picture of a rough thing is made of. sharp: those that are left as traced, for they show edges that no
     neighbour knows of. joint: those of which the differences count too, for roughness has a slope. highlights:
-    glossy lobes whose known highlights are taken out while noise is averaged (`stages.light.lamps`). principled: False for
+    glossy lobes whose known highlights are taken out while noise is averaged (`stages.light.highlights`). principled: False for
     glTF's, or weights of Burley's departure from Lambert and of the dielectric's reflection.
     """
 

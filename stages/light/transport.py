@@ -16,7 +16,7 @@ every term, every roughness and every environment:
   combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles;
 - neighbouring pixels use complementary samples; the points that turn out noisiest trace more; and what noise is left is
   averaged over neighbours that do not differ by more than it (`stages.light.reconstruction`), less the highlights that a
-  lamp would make in the open (`stages.light.lamps`), which averaging would flatten.
+  lamp would make in the open (`stages.light.highlights`), which averaging would flatten.
 
 These errors fall as rays are added. What stays is the resolution of the lights, 0.4 degrees (`stages.light.light_set`), under
 what roughness 0.08 spreads; a mirror looks up the light itself. The result depends on seed and pixel only, not on threads.
@@ -38,7 +38,7 @@ from stages.core.albedo import MIN_COSINE
 from stages.core.brdf import alpha_from_roughness
 from stages.core.frames import tangent_frame
 from stages.core.shading import KNOTS, Transport
-from stages.light import lamps, reconstruction
+from stages.light import highlights, reconstruction
 from stages.light.environment import Environment, lookup
 from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
@@ -162,10 +162,13 @@ def smoothed(
 ) -> NDArray[np.float32]:
     """The sums with their noise averaged away, (P, stored, CHANNELS); uses up the sums it is given."""
     sums.variance[:, terms.sharp] = 0
+    if not terms.highlights:
+        return reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
     places = terms.places_of_highlights()
-    kept = lamps.take_out(sums.mean, points, lights.lamps, terms.alphas[list(terms.highlights)], places)
+    shown = highlights.open_highlights(points, lights.lamps, terms.alphas[list(terms.highlights)])
+    kept = highlights.take_out(sums.mean, sums.variance, shown, places, near)
     result = reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
-    lamps.put_back(result, sums.mean, kept, places)
+    highlights.put_back(result, sums.mean, kept, places)
     return result
 
 

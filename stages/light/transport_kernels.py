@@ -134,7 +134,8 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
                 k = cell[p, place]
                 if k < 0:
                     continue
-                line = (shift[c, 1] + offset1 + (i + 1) * GOLDEN) % 1.0
+                line = shift[c, 1] + offset1 + (i + 1) * GOLDEN
+                line -= math.floor(line)
                 d0, d1, d2 = _in_cell(k, within[p, place], line, excess)
                 if d0 * n[p, 0] + d1 * n[p, 1] + d2 * n[p, 2] <= 0:
                     continue
@@ -144,7 +145,8 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
                 if lobe < 0:  # the mirror direction
                     x, y, z = -ox, -oy, oz
                 else:
-                    u = (f32(i) + (f32(shift[c, 0] + offset0) + jitter[p]) % f32(1)) / f32(count)
+                    first = f32(shift[c, 0] + offset0) + jitter[p]
+                    u = (f32(i) + (first - f32(math.floor(first)))) / f32(count)
                     cos, sin = turn[c, s, 0], turn[c, s, 1]
                     if lobe == 0:
                         radius = math.sqrt(u)
@@ -206,13 +208,11 @@ def _in_cell(k, u, line, excess):  # type: ignore[no-untyped-def]
     start, end = begin[k]
     low = cumulative[start - 1] if start > 0 else 0.0
     target = low + u * (cumulative[end - 1] - low)
-    left, right = start, end - 1  # the first texel whose cumulative energy exceeds the target
-    while left < right:
-        middle = (left + right) // 2
-        if cumulative[middle] > target:
-            right = middle
-        else:
-            left = middle + 1
+    left, count = start, end - start  # the first texel whose cumulative energy exceeds the target
+    while count > 1:
+        half = count >> 1
+        left += half if cumulative[left + half - 1] <= target else 0
+        count -= half
     if left > start:
         low = cumulative[left - 1]
     width = cumulative[left] - low  # 0 where the sum's rounding has swallowed the texel
