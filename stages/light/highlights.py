@@ -11,6 +11,7 @@ left of a picture when what is known is taken out).
 
 import math
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
@@ -166,7 +167,7 @@ def _take_out(mean, shown, places, pixel, moments, start, end, kept):  # type: i
                 mean[p, places[j], c] -= seen[c] * shown[p, j, c]
 
 
-@fast
+@numba.njit(error_model="numpy", cache=True, nogil=True)  # in this very order: no highlight is added to what it hides
 def _put_back(smooth, mean, kept, places, start, end):  # type: ignore[no-untyped-def]
     for p in range(start, end):
         for j in range(len(places)):
