@@ -24,26 +24,17 @@ def direction_to_square(x, y, z):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(inline="always", error_model="numpy", cache=True)
-def sincos(x):  # type: ignore[no-untyped-def]
-    """Sine and cosine of an angle of at most 45 degrees, to 1e-13, by their series: half the time of the library's."""
-    q = x * x
-    sin = x * (1 - q / 6 * (1 - q / 20 * (1 - q / 42 * (1 - q / 72 * (1 - q / 110 * (1 - q / 156))))))
-    cos = 1 - q / 2 * (1 - q / 12 * (1 - q / 30 * (1 - q / 56 * (1 - q / 90 * (1 - q / 132 * (1 - q / 182))))))
-    return sin, cos
-
-
-@numba.njit(inline="always", error_model="numpy", cache=True)
 def square_to_direction(u, v):  # type: ignore[no-untyped-def]
     """[0, 1]^2 to a unit direction, the inverse of `direction_to_square`."""
     u, v = 2 * u - 1, 2 * v - 1
     a, b = abs(u), abs(v)
     distance = 1 - (a + b)
     radius = 1 - abs(distance)
-    sin, cos = sincos((b - a) / radius * (math.pi / 4) if radius > 0 else -math.pi / 4)  # of the azimuth less 45 degrees
+    phi = ((b - a) / radius + 1) * (math.pi / 4) if radius > 0 else 0.0
     z = 1 - radius * radius
     z = z if distance >= 0 else -z
-    scale = radius * math.sqrt(max(1 - 0.5 * radius * radius, 0.0))
-    x, y = (cos - sin) * scale, (cos + sin) * scale
+    scale = radius * math.sqrt(max(2 - radius * radius, 0.0))
+    x, y = math.cos(phi) * scale, math.sin(phi) * scale
     return (x if u >= 0 else -x), (y if v >= 0 else -y), z
 
 
