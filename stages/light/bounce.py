@@ -100,22 +100,22 @@ def _chunk(
     n, wo = points.n[part], points.wo[part]
     frame = (n, *tangent_frame(n))
     unused = np.zeros((len(part), len(lights.cells.energy)), np.float32)
-    directions, owner, row = rays.draw(frame, wo, pixel, terms.alphas, lights, unused)
-    hits = scene.intersect(points.origin[part][owner], directions)
+    drawn = rays.draw(frame, wo, points.origin[part], pixel, terms.alphas, lights, unused)
+    hits = scene.intersect(drawn.origin, drawn.direction)
     if not hits.mask.any():
         return
     hit = np.where(hits.mask, np.cumsum(hits.mask) - 1, -1).astype(np.int32)
     count = int(hits.mask.sum())
     pixels = np.arange(8 * -(-count // 8)).reshape(8, -1) < count  # eight rows: neighbours' samples complement each other
-    there = lifted_points(surface_points(scene, hits, directions, pixels))
+    there = lifted_points(surface_points(scene, hits, drawn.direction, pixels))
     maps = light_maps(trace(scene, there, lights, THERE, rays.seed + SEED_STEP, terms).mean)
     shown = np.ascontiguousarray(maps[:, terms.summed])
-    sampled = (rays.counts, rays.bounds, terms.principled)
+    sampled = (rays.counts, rays.bounds, rays.slots, terms.principled)
     where = (part, terms.summed)
     accumulate_bounce(
-        *frame, wo, terms.alphas, sampled, row, directions, hit, shown, rays.table, where, mean, gap
+        *frame, wo, terms.alphas, sampled, drawn, hit, shown, rays.table, where, mean, gap
     )
-    mirrored = hit[row[:, -1]]
+    mirrored = hit[drawn.row[:, -1]]
     seen = mirrored >= 0
     cosine = (n[seen] * wo[seen]).sum(-1, keepdims=True).astype(np.float64).clip(0, 1)
     metal, dielectric = terms.mirror_weights(cosine)

@@ -98,18 +98,23 @@ def directions_of_texels(height: int, width: int) -> tuple[NDArray[np.float64], 
 @numba.njit(error_model="numpy", cache=True, nogil=True)
 def lookup(radiance, directions):  # type: ignore[no-untyped-def]
     """Bilinear radiance along unit directions. Args: (H, W, 3), (N, 3) world. Returns: (N, 3) float64."""
-    height, width, _ = radiance.shape
     result = np.empty((len(directions), 3))
     for i in range(len(directions)):
-        x, y, z = directions[i, 0], directions[i, 1], directions[i, 2]
-        u = (0.5 - math.atan2(y, x) / (2 * math.pi)) * width - 0.5
-        v = math.acos(min(max(z, -1.0), 1.0)) / math.pi * height - 0.5
-        column, row = math.floor(u), math.floor(v)
-        fu, fv = u - column, v - row
-        left, right = int(column) % width, (int(column) + 1) % width
-        top, bottom = min(max(int(row), 0), height - 1), min(max(int(row) + 1, 0), height - 1)
-        for c in range(3):
-            above = radiance[top, left, c] * (1 - fu) + radiance[top, right, c] * fu
-            below = radiance[bottom, left, c] * (1 - fu) + radiance[bottom, right, c] * fu
-            result[i, c] = above * (1 - fv) + below * fv
+        look_up(radiance, directions[i], result[i])
     return result
+
+
+@numba.njit(error_model="numpy", cache=True, nogil=True)
+def look_up(radiance, direction, found):  # type: ignore[no-untyped-def]
+    """Write the bilinear radiance along one unit direction, (3,), into `found`, (3,)."""
+    height, width, _ = radiance.shape
+    u = (0.5 - math.atan2(direction[1], direction[0]) / (2 * math.pi)) * width - 0.5
+    v = math.acos(min(max(direction[2], -1.0), 1.0)) / math.pi * height - 0.5
+    column, row = math.floor(u), math.floor(v)
+    fu, fv = u - column, v - row
+    left, right = int(column) % width, (int(column) + 1) % width
+    top, bottom = min(max(int(row), 0), height - 1), min(max(int(row) + 1, 0), height - 1)
+    for c in range(3):
+        above = radiance[top, left, c] * (1 - fu) + radiance[top, right, c] * fu
+        below = radiance[bottom, left, c] * (1 - fu) + radiance[bottom, right, c] * fu
+        found[c] = above * (1 - fv) + below * fv

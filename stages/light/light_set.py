@@ -6,8 +6,10 @@ in a pyramid, which any ray may look up at the solid angle it stands for; and th
 """
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +28,12 @@ FINE = 512
 OVERSAMPLE, OVERSAMPLE_EXCESS = 3, 8
 """Look-ups along each side of a texel; a sun is smaller than a texel, and its energy must come out right."""
 
-CELLS = 32
-"""Cells along each side of the square by which light rays are aimed: 6 degrees."""
+LARGEST_CELL, CELLS = 8, 64
+"""Cells by which light rays are aimed, along each side of the square: from 25 degrees to 3."""
+
+CUT = 8e-3
+"""Share of its environment's excess above which a cell of 1/16 of the side is cut in four; one of half that side is worth four
+times as much."""
 
 LEAST_EXCESS = 1e-4
 """An excess of less than this share of the energy is not worth rays of its own."""
@@ -51,9 +57,8 @@ class LightSet:
     fine: (4 N, CHANNELS) float32, the excess in blocks of 2 x 2 texels. block: (FINE / 2, FINE / 2) int32, a block's
     number, or -1 where there is no excess.
     density: (4 N, MAX_LIGHTS) float32, density (1/sr) of directions drawn by the energy of each environment's excess.
-    texels, cumulative: of all environments after each other, the excess texels along a Morton curve, on which every
-    cell is one stretch, and the running sum of their shares of their environment's energy.
-    cells: the squares of FINE / CELLS texels that hold excess.
+    texels: the same, one environment after the other, to be drawn from.
+    cells: squares that hold excess, small where it is bright.
     lamps: the excess again, in clusters that are small where it is bright.
     demand: (environments,) how light rays are best shared out: the noise that one ray in each would leave, as a share of the
     environment's mean, for a dim one is exposed longer.
@@ -65,23 +70,37 @@ class LightSet:
     fine: NDArray[np.float32]
     block: NDArray[np.int32]
     density: NDArray[np.float32]
-    texels: NDArray[np.int32]
-    cumulative: NDArray[np.float64]
+    texels: "Texels"
     cells: "Cells"
     lamps: Lamps
     demand: NDArray[np.float64]
+
+
+class Texels(NamedTuple):
+    """The excess texels of one environment after the other, along a Morton curve, on which every cell is a stretch: T in all.
+
+    place: (T,) int32, row times FINE plus column. cumulative: (T,) float64, running sum of their shares of their environment's
+    energy. guide: (T,) int32, the i-th of a cell's n texels holds which one of them is met at i / n of the cell's energy.
+    radiance: (T, 3) float32.
+    """
+
+    place: NDArray[np.int32]
+    cumulative: NDArray[np.float64]
+    guide: NDArray[np.int32]
+    radiance: NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Cells:
     """The excess of all environments in coarse cells, environment by environment: K in all.
 
-    direction: (3, K) float32, mean. energy: (K,) float32, share of their environment's. begin: (K, 2) int64, range of
-    texels. first: (environments + 1,) int64, where an environment's cells begin. number: (environments, CELLS, CELLS)
-    int32, a cell's place in the arrays, or -1.
+    direction: (3, K) float32, mean. radius: (K,) float32, radians, of a disc as large as a cell. energy: (K,) float32, share of
+    their environment's. begin: (K, 2) int64, range of texels. first: (environments + 1,) int64, where an environment's cells
+    begin. number: (environments, CELLS, CELLS) int32, which cell a square belongs to, or -1.
     """
 
     direction: NDArray[np.float32]
+    radius: NDArray[np.float32]
     energy: NDArray[np.float32]
     begin: NDArray[np.int64]
     first: NDArray[np.int64]
@@ -107,28 +126,30 @@ def light_set(environments: list[Environment]) -> LightSet:
     fine, block = _blocks(np.concatenate(peaks, -1))
     density = np.zeros((len(fine), MAX_LIGHTS), np.float32)
     density[:, : len(environments)] = _in_blocks(energy, block >= 0) * (FINE**2 / (4 * np.pi))
-    texels, cumulative, cells = _cells(energy)
-    shares = np.split(cells.energy, cells.first[1:-1])
-    demand = np.array([_demand(*parts) for parts in zip(squares, peaks, shares, strict=True)])
+    texels, cells = _cells(energy, peaks)
+    demand = np.array([_demand(*parts) for parts in zip(squares, peaks, np.moveaxis(energy, -1, 0), strict=True)])
     whole = [luminance(square).mean() + luminance(peak).mean() for square, peak in zip(squares, peaks, strict=True)]
     lamps = cluster(np.stack(peaks), np.array(whole), CHANNELS)
-    return LightSet(tuple(environments), pyramid, start, fine, block, density, texels, cumulative, cells, lamps, demand)
+    return LightSet(tuple(environments), pyramid, start, fine, block, density, texels, cells, lamps, demand)
 
 
 def _demand(residual: NDArray, excess: NDArray, energy: NDArray) -> float:
-    """Share of the light that is excess, times how unsure it is which cell a ray goes to."""
+    """Share of the light that is excess, times how unsure it is which of 32 x 32 squares a ray goes to."""
+    energy = energy.reshape(32, FINE // 32, 32, FINE // 32).sum((1, 3))
     bright = float(luminance(excess).mean())
     mean = bright + float(luminance(residual).mean())
     return bright / max(mean, np.finfo(float).tiny) * float(np.sqrt(max(1 - np.square(energy).sum(), 0.0)))
 
 
-def _cells(energy: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float64], Cells]:
-    """Texels with energy, their cumulative energy, and the cells. Args: (FINE, FINE, environments), each of sum 1."""
+def _cells(energy: NDArray, peaks: Sequence[NDArray]) -> tuple[Texels, Cells]:
+    """Texels with energy, and the cells. Args: (FINE, FINE, environments), each of sum 1; the excess, (FINE, FINE, 3) each."""
     side = FINE // CELLS
     x, y, z = texel_directions(FINE)
     texels: list[NDArray] = []
     energies: list[NDArray] = []
+    radiance: list[NDArray] = []
     direction: list[list[NDArray]] = []
+    radius: list[NDArray] = []
     share: list[NDArray] = []
     begin: list[NDArray] = []
     first = [0]
@@ -136,26 +157,56 @@ def _cells(energy: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float64], Cel
     for e in range(energy.shape[-1]):
         own = energy[..., e].ravel()
         index = np.flatnonzero(own)
-        index = index[np.argsort(_morton(index // FINE, index % FINE), kind="stable")]
-        cell = (index // FINE // side) * CELLS + index % FINE // side
-        start = np.flatnonzero(np.diff(cell, prepend=-1))
+        code = _morton(index // FINE, index % FINE)
+        order = np.argsort(code, kind="stable")
+        index = index[order]
+        corner, across = _cut(code[order], own[index])
+        start = np.flatnonzero(np.diff(corner, prepend=-1))
         if len(start):
+            radius.append(np.sqrt(4 / across[start] ** 2))
             share.append(np.add.reduceat(own[index], start))
             direction.append([np.add.reduceat((own * axis.ravel())[index], start) for axis in (x, y, z)])
             begin.append(np.stack([start, np.append(start[1:], len(index))], -1) + sum(map(len, texels)))
-            number[e].reshape(-1)[cell[start]] = np.arange(len(start)) + first[-1]
+            of_texel = np.cumsum(np.diff(corner, prepend=-1) != 0) - 1
+            number[e, index // FINE // side, index % FINE // side] = of_texel + first[-1]
         first.append(first[-1] + len(start))
         texels.append(index)
         energies.append(own[index])
+        radiance.append(peaks[e].reshape(-1, 3)[index].astype(np.float32))
     mean = np.concatenate([np.zeros((3, 0)), *direction], 1)
     cells = Cells(
         (mean / np.linalg.norm(mean, axis=0)).astype(np.float32),
+        np.concatenate([np.zeros(0), *radius]).astype(np.float32),
         np.concatenate([np.zeros(0), *share]).astype(np.float32),
         np.concatenate([np.zeros((0, 2), np.int64), *begin]),
         np.array(first),
         number,
     )
-    return np.concatenate(texels).astype(np.int32), np.cumsum(np.concatenate(energies)), cells
+    cumulative = np.cumsum(np.concatenate(energies))
+    guide = _guide(cumulative, cells.begin)
+    return Texels(np.concatenate(texels).astype(np.int32), cumulative, guide, np.concatenate(radiance)), cells
+
+
+def _cut(code: NDArray[np.int64], energy: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The cell of each texel on the Morton curve: the code that it begins with, and how many such cells lie along a side."""
+    size, corner, across = LARGEST_CELL, np.zeros_like(code), np.zeros_like(code)
+    uncut = np.ones(len(code), bool)
+    while True:
+        begin = code // (FINE // size) ** 2 * (FINE // size) ** 2
+        corner[uncut], across[uncut] = begin[uncut], size
+        if size == CELLS:
+            return corner, across
+        _, inside = np.unique(begin, return_inverse=True)
+        uncut &= np.bincount(inside, energy)[inside] > CUT * (size / 16) ** 2
+        size *= 2
+
+
+def _guide(cumulative: NDArray[np.float64], begin: NDArray[np.int64]) -> NDArray[np.int32]:
+    """`Texels.guide`. Source: Chen & Asau 1974, "On Generating Random Variates from an Empirical Distribution"."""
+    start, end = begin.repeat(begin[:, 1] - begin[:, 0], 0).T
+    low = np.where(start > 0, cumulative[start - 1], 0.0)
+    energy = low + (np.arange(len(start)) - start) / (end - start) * (cumulative[end - 1] - low)
+    return np.minimum(np.searchsorted(cumulative, energy, "right"), end - 1).astype(np.int32)
 
 
 def _blocks(peaks: NDArray) -> tuple[NDArray[np.float32], NDArray[np.int32]]:

@@ -23,11 +23,11 @@ from stages.light.gbuffer import GBuffer
 RADIUS = 2
 """Of the window, pixels: it holds every class of a 4 x 4 block of interleaved samples at least once."""
 
-TOLERANCE = 12.0
+TOLERANCE = 20.0
 """A neighbour counts for nothing when its squared difference exceeds this many times the sum of both variances; its own
 is taken for no more than the point's, so that noise does not flow to where there is none."""
 
-TOGETHER = 8.0
+TOGETHER = 5.0
 """Nor does it count when the squared differences of the first sum, diffuse light, exceed this many times what noise explains,
 on average over all lights and colours: what stands in the way of one light stands in the way of others."""
 
@@ -96,15 +96,34 @@ def smoothed(
     return _weighted(mean, noise, near, 1, joint)
 
 
-def noisiest(mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, count: int) -> NDArray[np.int64]:
+def noisiest(
+    mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, judged: tuple[int, ...], count: int
+) -> NDArray[np.int64]:
     """Rows of the points with most noise left once smoothed, in tone-mapped sums, x / (1 + x); ascending.
 
     A point on a thin rim, whose neighbours lie on other surfaces, keeps all its noise; one on a flat loses most of it.
+
+    Args:
+        mean, noise: (P, sums, channels). judged: the sums that count.
     """
     if count == 0:
         return np.zeros(0, np.int64)
-    left = _weighted(mean, noise, near, 2) / (1 + mean.clip(0)) ** 4
-    return np.sort(np.argpartition(-left.sum((1, 2)), count - 1)[:count])
+    some, their_noise = (_sums(values, judged) for values in (mean, noise))
+    left = _weighted(some, their_noise, near, 2)
+    seen = np.empty(len(left), np.float32)
+    in_parts(lambda start, end: _seen(_rows(some), _rows(left), start, end, seen), len(seen), POINTS_PER_TASK)
+    return np.sort(np.argpartition(-seen, count - 1)[:count])
+
+
+def _sums(values: NDArray[np.float32], which: tuple[int, ...]) -> NDArray[np.float32]:
+    """Some of the sums of each point."""
+    result = np.empty((len(values), len(which), values.shape[2]), np.float32)
+
+    def part(start: int, end: int) -> None:
+        np.take(values[start:end], which, 1, result[start:end], "clip")
+
+    in_parts(part, len(values), POINTS_PER_TASK)
+    return result
 
 
 def _weighted(
@@ -140,6 +159,17 @@ def _merge(mean, noise, rows, new_mean, new_noise, share, start, end):  # type: 
         for k in range(mean.shape[1]):
             mean[p, k] += w * (new_mean[i, k] - mean[p, k])
             noise[p, k] = (np.float32(1) - w) ** 2 * noise[p, k] + w * w * new_noise[i, k]
+
+
+@fast
+def _seen(mean, noise, start, end, result):  # type: ignore[no-untyped-def]
+    """Noise of each point in its tone-mapped sums."""
+    for p in range(start, end):
+        total = np.float32(0)
+        for k in range(mean.shape[1]):
+            square = (np.float32(1) + max(mean[p, k], np.float32(0))) ** 2
+            total += noise[p, k] / (square * square)
+        result[p] = total
 
 
 @fast

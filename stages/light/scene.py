@@ -36,14 +36,15 @@ class Scene:
         self.vertices = np.ascontiguousarray(vertices, np.float32)
         self.triangles = np.ascontiguousarray(triangles, np.int32)
         self.normals = np.ascontiguousarray(normals, np.float32)
-        self._embree = EmbreeScene(robust=True)
-        self._mesh = TriangleMesh(self._embree, self.vertices, self.triangles)
-        self.occluded(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))  # builds the tree, once
+        self._closest, self._any = EmbreeScene(robust=True), EmbreeScene(robust=False)
+        self._meshes = [TriangleMesh(embree, self.vertices, self.triangles) for embree in (self._closest, self._any)]
+        for embree in (self._closest, self._any):
+            embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")  # builds the tree, once
 
     def intersect(self, origins: NDArray, directions: NDArray) -> Hits:
         """Closest hit of each ray. Args: (R, 3) each; directions need not be unit: t is in their length."""
         o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
-        hit = self._embree.run(o, d, query="INTERSECT", output=True)
+        hit = self._closest.run(o, d, query="INTERSECT", output=True)
         mask = hit["primID"] >= 0
         u, v = np.where(mask, hit["u"], 0), np.where(mask, hit["v"], 0)
         barycentric = np.stack([1 - u - v, u, v], -1).astype(np.float32)
@@ -52,7 +53,7 @@ class Scene:
     def occluded(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
         """Whether anything lies along each ray, at any distance. Args: (R, 3) each."""
         o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
-        return self._embree.run(o, d, query="OCCLUDED") >= 0
+        return self._any.run(o, d, query="OCCLUDED") >= 0
 
     def shaded_smooth(self) -> "Scene":
         """The same mesh with normals that are smooth over every edge: at a vertex, its faces' by the angle they have there.

@@ -29,6 +29,7 @@ Heidrich 2001, "Interleaved Sampling".
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -39,12 +40,12 @@ from stages.core.brdf import alpha_from_roughness
 from stages.core.frames import tangent_frame
 from stages.core.shading import KNOTS, Transport
 from stages.light import highlights, reconstruction
-from stages.light.environment import Environment, lookup
+from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
 from stages.light.terms import GLTF, Terms
-from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts
+from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts, mirror
 
 TILE = 512
 """Points a thread takes at once: their rays stay in its cache."""
@@ -150,8 +151,8 @@ def gather(
     """The sums of every point, with further rays where they are noisiest."""
     sums = trace(scene, points, lights, quality, seed, terms)
     for i, (share, factor) in enumerate(EXTRA if quality.extra else (), 1):
-        judged = sums.mean[:, terms.judged], sums.variance[:, terms.judged]
-        worst = reconstruction.noisiest(*judged, near, int(share * len(points.n)))
+        count = int(share * len(points.n))
+        worst = reconstruction.noisiest(sums.mean, sums.variance, near, terms.judged, count)
         more = trace(scene, points[worst], lights, quality.scaled(factor), seed + i * SEED_STEP, terms)
         add(sums, worst, more, factor)
     return sums
@@ -180,7 +181,7 @@ def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
 
 def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int, terms: Terms = GLTF) -> Sums:
     """The sums of every point by Monte Carlo, each on its own."""
-    mean, gap = np.zeros((2, len(points.n), terms.stored, CHANNELS), np.float32)
+    mean, gap = np.empty((2, len(points.n), terms.stored, CHANNELS), np.float32)
     rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -205,26 +206,17 @@ def _tile(
     n, wo, origin, cells = points.n[part], points.wo[part], points.origin[part], lights.cells
     frame, alphas = (n, *tangent_frame(n)), terms.alphas
     chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
-    aim(n, wo, AIM, (cells.direction, cells.energy), cells.first, chosen, aimed)
-    directions, owner, row = rays.draw(frame, wo, pixel, alphas, lights, chosen)
-    occluded = scene.occluded(origin[owner], directions)
-    seen = (lights.pyramid, lights.level_start, lights.fine, lights.block, rays.density, cells.number, aimed)
-    sampled = (rays.counts, rays.bounds, terms.principled)
+    aim(n, wo, AIM, (cells.direction, cells.radius, cells.energy, cells.first), chosen, aimed)
+    drawn = rays.draw(frame, wo, origin, pixel, alphas, lights, chosen)
+    occluded = scene.occluded(drawn.origin, drawn.direction)
+    seen = (lights.pyramid, lights.level_start, lights.fine, lights.block, lights.texels.radiance, rays.density, cells.number, aimed)
+    sampled = (rays.counts, rays.bounds, rays.slots, terms.principled)
     where = (part, terms.summed)
-    accumulate(*frame, wo, alphas, sampled, row, directions, occluded, rays.table, seen, where, mean, gap)
-    mirror = row[:, -1]
-    _mirror(n, wo, directions[mirror], ~occluded[mirror], lights, terms, part, mean)
-
-
-def _mirror(
-    n: NDArray, wo: NDArray, wi: NDArray, visible: NDArray, lights: LightSet, terms: Terms, part: NDArray, mean: NDArray
-) -> None:
-    cosine = (n * wo).sum(-1, keepdims=True).astype(np.float64).clip(0, 1)
-    weights = terms.mirror_weights(cosine)
+    accumulate(*frame, wo, alphas, sampled, drawn, occluded, rays.table, seen, where, mean, gap)
+    mean[part[:, None], terms.mirror] = gap[part[:, None], terms.mirror] = 0
+    weights = np.stack(terms.mirror_weights((n * wo).sum(-1).astype(np.float64).clip(0, 1)))
     for e, environment in enumerate(lights.environments):
-        radiance = lookup(environment.radiance, wi) * visible[:, None]
-        for slot, weight in zip(terms.mirror, weights, strict=True):
-            mean[part, slot, 3 * e : 3 * e + 3] = weight * radiance
+        mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
 
 
 def tiles(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -281,19 +273,36 @@ class Rays:
         self,
         frame: tuple[NDArray, NDArray, NDArray],
         wo: NDArray,
+        origin: NDArray,
         pixel: NDArray,
         alphas: NDArray,
         lights: LightSet,
         chosen: NDArray,
-    ) -> tuple[NDArray[np.float32], NDArray[np.int32], NDArray[np.int32]]:
-        """Directions (R, 3) of a tile's points, the point (R,) that each belongs to, and its row (P, S), -1 for none."""
+    ) -> "Drawn":
+        """The rays of a tile's points, R in all."""
         count, slots = len(wo), len(self.slots)
-        directions, owner = np.empty((count * slots, 3), np.float32), np.empty(count * slots, np.int32)
-        row = np.empty((count, slots), np.int32)
-        excess = (lights.texels, lights.cumulative, lights.cells.begin, lights.cells.first)
+        most = count * slots
+        origins, directions = np.empty((2, most, 3), np.float32)
+        texel, density = np.empty(most, np.int32), np.empty(most, np.float32)
+        rays = Drawn(origins, directions, texel, density, np.empty((count, slots), np.int32))
+        excess = (lights.texels, lights.cells.begin, lights.cells.first)
         samples = (self.slots, self.shift, self.turn, self.jitter, self.seed)
-        used = draw(*frame, wo, pixel, samples, alphas, excess, chosen, directions, owner, row)
-        return directions[:used], owner[:used], row
+        used = draw(*frame, wo, origin, pixel, samples, alphas, excess, chosen, rays)
+        return Drawn(*(values[:used] for values in rays[:-1]), rays.row)
+
+
+class Drawn(NamedTuple):
+    """Rays of a tile's points. origin, direction: (R, 3). row: (P, S), a sample's ray, or -1 where it is under the horizon.
+
+    texel, density: (R,), of light rays: their texel among those of the `LightSet`, and how many light rays per steradian there
+    are.
+    """
+
+    origin: NDArray[np.float32]
+    direction: NDArray[np.float32]
+    texel: NDArray[np.int32]
+    density: NDArray[np.float32]
+    row: NDArray[np.int32]
 
 
 def share_out(light: int, lights: LightSet) -> NDArray[np.int64]:

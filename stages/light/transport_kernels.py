@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from stages.core.albedo import COSINE_STEPS, MIN_COSINE
 from stages.light.blender import F0, burley, fresnel
+from stages.light.environment import look_up
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
 from stages.light.octahedral import square_to_direction
 
@@ -18,8 +19,11 @@ GOLDEN = 0.6180339887498949
 
 CELL_SHIFT = int(math.log2(FINE // CELLS))
 
-CELL_RADIUS = math.sqrt(4 / CELLS**2)
-"""Radius, in radians, of a disc as large as a cell."""
+WEIGHT = CHANNELS - 1
+"""The channel, no light's, that holds 1 for every lobe ray: its sums are those of the weights."""
+
+LANES = 16
+"""Rays are weighed in multiples of this many, so that a vector unit has no odd ones left over."""
 
 fast = numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
 inline = numba.njit(inline="always", error_model="numpy", cache=True)
@@ -51,18 +55,18 @@ def hashed(x, y):  # type: ignore[no-untyped-def]
 
 
 @fast
-def aim(n, wo, alphas, cells, first, chosen, share):  # type: ignore[no-untyped-def]
+def aim(n, wo, alphas, cells, chosen, share):  # type: ignore[no-untyped-def]
     """How much of each cell of the excess a point would reflect if nothing stood in the way.
 
     A light ray is drawn from a cell in proportion to its energy times the BRDF there, summed over a white diffuse and a
     few glossy materials: product importance sampling, without visibility.
 
     Args:
-        n, wo: (P, 3). alphas: of the glossy lobes. cells: directions (3, K) and energy (K,). first: of `Cells`.
+        n, wo: (P, 3). alphas: of the glossy lobes. cells: direction, radius, energy and first of `Cells`.
         chosen, share: (P, K), written: probability of each cell among its environment's, and that over its energy.
     """
     f32 = np.float32
-    direction, energy = cells
+    direction, radius, energy, first = cells
     count = len(energy)
     for p in range(len(n)):
         ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
@@ -70,14 +74,14 @@ def aim(n, wo, alphas, cells, first, chosen, share):  # type: ignore[no-untyped-
         wo_z = max(ox * nx + oy * ny + oz * nz, f32(MIN_COSINE))
         for k in range(count):
             wi_z = direction[0, k] * nx + direction[1, k] * ny + direction[2, k] * nz
-            share[p, k] = max(wi_z + f32(CELL_RADIUS), f32(0)) * f32(1 / math.pi)
+            share[p, k] = max(wi_z + radius[k], f32(0)) * f32(1 / math.pi)
         for a in range(len(alphas)):
             a2 = alphas[a] * alphas[a]
             lambda_o = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) - wo_z * wo_z) / (wo_z * wo_z))
             scale = f32(0.25) * a2 / (f32(math.pi) * wo_z)
             for k in range(count):
                 wx, wy, wz = direction[0, k], direction[1, k], direction[2, k]
-                wi_z = max(wx * nx + wy * ny + wz * nz, f32(CELL_RADIUS))
+                wi_z = max(wx * nx + wy * ny + wz * nz, radius[k])
                 hx, hy, hz = wx + ox, wy + oy, wz + oz
                 h2 = max(hx * hx + hy * hy + hz * hz, f32(1e-6))
                 hn = hx * nx + hy * ny + hz * nz
@@ -95,19 +99,19 @@ def aim(n, wo, alphas, cells, first, chosen, share):  # type: ignore[no-untyped-
 
 
 @fast
-def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner, row):  # type: ignore[no-untyped-def]
-    """Draw a tile's directions above the horizon, those of neighbours along the same lobe after each other.
+def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # type: ignore[no-untyped-def]
+    """Draw a tile's rays above the horizon, those of neighbours along the same lobe after each other.
 
     Args:
-        n, t, b, wo: (P, 3) world. pixel: (P, 2), its class and its number in the image.
+        n, t, b, wo, origin: (P, 3) world. pixel: (P, 2), its class and its number in the image.
         samples: slots, shift, turn, jitter and seed of `Rays`. alphas: of the lobes after the cosine.
-        excess: texels and cumulative of a `LightSet`, begin and first of its cells. chosen: of `aim`.
-        directions: (P S, 3), owner: (P S,), row: (P, S), written; row is -1 for a direction under the horizon.
+        excess: texels of a `LightSet`, begin and first of its cells. chosen: of `aim`. rays: arrays of a `Drawn`, written.
     Returns:
-        Rows written.
+        Rays written.
     """
     f32 = np.float32
     slots, shift, turn, spread, seed = samples
+    origins, directions, texel, density, row = rays
     points, knots = len(n), len(alphas)
     lobes = knots + 1
     view = np.empty((lobes, points, 3), np.float32)  # stretched by each alpha, see core.brdf.sample_vndf
@@ -123,23 +127,29 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
             view[k + 1, p, 0], view[k + 1, p, 1], view[k + 1, p, 2] = x * a * s, y * a * s, z * s
         jitter[p] = hashed(pixel[p, 1], seed) * spread
     cell, within = _choose_cells(pixel, samples, excess, chosen, lobes, jitter)
+    us, vs, share = np.empty(points, np.float32), np.empty(points, np.float32), np.empty(points, np.float32)
+    found, towards = np.empty(points, np.int32), np.empty((3, points), np.float32)
     used = 0
     for s in range(len(slots)):
         lobe, i, count, place = slots[s]
         offset0, offset1 = hashed(2 * lobe, seed), hashed(2 * lobe + 1, seed)
+        if lobe >= lobes:
+            for p in range(points):
+                k = max(cell[p, place], 0)
+                line = shift[pixel[p, 0], 1] + offset1 + (i + 1) * GOLDEN
+                us[p], vs[p], found[p], share[p] = _in_cell(k, within[p, place], line - math.floor(line), excess)
+                share[p] *= f32(count) * chosen[p, k] * f32(FINE * FINE / (4 * math.pi))
+            for p in range(points):
+                towards[0, p], towards[1, p], towards[2, p] = on_square(us[p], vs[p])
         for p in range(points):
             c = pixel[p, 0]
             row[p, s] = -1
             if lobe >= lobes:
-                k = cell[p, place]
-                if k < 0:
+                x, y, z = towards[0, p], towards[1, p], towards[2, p]
+                if cell[p, place] < 0 or x * n[p, 0] + y * n[p, 1] + z * n[p, 2] <= 0:
                     continue
-                line = shift[c, 1] + offset1 + (i + 1) * GOLDEN
-                line -= math.floor(line)
-                d0, d1, d2 = _in_cell(k, within[p, place], line, excess)
-                if d0 * n[p, 0] + d1 * n[p, 1] + d2 * n[p, 2] <= 0:
-                    continue
-                directions[used, 0], directions[used, 1], directions[used, 2] = d0, d1, d2
+                directions[used, 0], directions[used, 1], directions[used, 2] = x, y, z
+                texel[used], density[used] = found[p], share[p]
             else:
                 ox, oy, oz = view[0, p, 0], view[0, p, 1], view[0, p, 2]
                 if lobe < 0:  # the mirror direction
@@ -165,7 +175,8 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
                     continue
                 for d in range(3):
                     directions[used, d] = x * t[p, d] + y * b[p, d] + z * n[p, d]
-            owner[used] = p
+            for d in range(3):
+                origins[used, d] = origin[p, d]
             row[p, s] = used
             used += 1
     return used
@@ -175,7 +186,7 @@ def draw(n, t, b, wo, pixel, samples, alphas, excess, chosen, directions, owner,
 def _choose_cells(pixel, samples, excess, chosen, lobes, jitter):  # type: ignore[no-untyped-def]
     """The cell of each light ray, or -1, and how far into that cell's share its sample lies: (P, light rays) each."""
     slots, shift, _, _, seed = samples
-    first = excess[3]
+    first = excess[-1]
     points, rays = len(pixel), 0
     for s in range(len(slots)):
         rays += slots[s, 0] >= lobes
@@ -203,21 +214,41 @@ def _choose_cells(pixel, samples, excess, chosen, lobes, jitter):  # type: ignor
 
 @inline
 def _in_cell(k, u, line, excess):  # type: ignore[no-untyped-def]
-    """A direction in cell k: the texel by its energy and u, the place across it by what is left of u and by `line`."""
-    texels, cumulative, begin, _ = excess
-    start, end = begin[k]
+    """A place in cell k on the octahedral square, u and v, its texel and that one's share of the cell.
+
+    The texel by its energy and u, the place across it by what is left of u and by `line`.
+    """
+    place, cumulative, guide, _ = excess[0]
+    start, end = excess[1][k]
     low = cumulative[start - 1] if start > 0 else 0.0
-    target = low + u * (cumulative[end - 1] - low)
-    left, count = start, end - start  # the first texel whose cumulative energy exceeds the target
-    while count > 1:
-        half = count >> 1
-        left += half if cumulative[left + half - 1] <= target else 0
-        count -= half
-    if left > start:
-        low = cumulative[left - 1]
-    width = cumulative[left] - low  # 0 where the sum's rounding has swallowed the texel
-    across = min((target - low) / width, 0.999999) if width > 0 else 0.5
-    return square_to_direction((texels[left] % FINE + across) / FINE, (texels[left] // FINE + line) / FINE)
+    whole = cumulative[end - 1] - low
+    target = low + u * whole
+    i = guide[min(start + int(u * (end - start)), end - 1)]  # the first texel whose cumulative energy exceeds the target
+    while i < end - 1 and cumulative[i] <= target:
+        i += 1
+    if i > start:
+        low = cumulative[i - 1]
+    width = cumulative[i] - low  # 0 where the sum's rounding has swallowed the texel
+    across = min(max((target - low) / width, 0.0), 0.9999) if width > 0 else 0.5
+    share = np.float32(width / whole if width > 0 else 1.0)
+    return np.float32((place[i] % FINE + across) / FINE), np.float32((place[i] // FINE + line) / FINE), i, share
+
+
+@inline
+def on_square(u, v):  # type: ignore[no-untyped-def]
+    """`octahedral.square_to_direction` in float32, to 1e-6. Source: Taylor series around 0, of cosine and sine."""
+    f32 = np.float32
+    u, v = f32(2) * u - f32(1), f32(2) * v - f32(1)
+    a, b = abs(u), abs(v)
+    distance = f32(1) - (a + b)
+    radius = f32(1) - abs(distance)
+    t = (b - a) / max(radius, f32(1e-20)) * f32(math.pi / 4)  # the angle from the diagonal
+    q = t * t
+    cos = f32(1) + q * (f32(-1 / 2) + q * (f32(1 / 24) + q * (f32(-1 / 720) + q * f32(1 / 40320))))
+    sin = t * (f32(1) + q * (f32(-1 / 6) + q * (f32(1 / 120) + q * (f32(-1 / 5040) + q * f32(1 / 362880)))))
+    scale = radius * math.sqrt(f32(1) - f32(0.5) * radius * radius)  # of 1 / sqrt 2, the diagonal's cosine and sine
+    x, y, z = (cos - sin) * scale, (cos + sin) * scale, f32(1) - radius * radius
+    return (x if u >= f32(0) else -x), (y if v >= f32(0) else -y), (z if distance >= f32(0) else -z)
 
 
 @inline
@@ -305,7 +336,7 @@ def weigh(  # type: ignore[no-untyped-def]
 
 
 @inline
-def _scales(table, n, wo, p, j, normaliser):  # type: ignore[no-untyped-def]
+def _scales(table, n, wo, p, j, first, second):  # type: ignore[no-untyped-def]
     """Of sum j at point p: what makes both halves of the rays, the first and the second a mean each.
 
     Divided by their own weights and multiplied by the open-point albedo; plain sums where the table has no rows.
@@ -318,7 +349,6 @@ def _scales(table, n, wo, p, j, normaliser):  # type: ignore[no-untyped-def]
     cell = min(int(position), COSINE_STEPS - 2)
     x = position - f32(cell)
     albedo = table[cell, j] * (f32(1) - x) + table[cell + 1, j] * x
-    first, second = normaliser[0, j], normaliser[1, j]
     return (
         albedo / (first + second) if first + second > 0 else f32(0),
         albedo / first if first > 0 else f32(0),
@@ -327,37 +357,36 @@ def _scales(table, n, wo, p, j, normaliser):  # type: ignore[no-untyped-def]
 
 
 @fast
-def accumulate(  # type: ignore[no-untyped-def]
-    n, t, b, wo, alphas, sampled, row, directions, occluded, table, seen, where, out, gap
-):
+def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, table, seen, where, out, gap):  # type: ignore[no-untyped-def]
     """Sum the rays of each point.
 
     Args:
-        n, t, b, wo: (P, 3) world. alphas: of the glossy lobes. sampled: counts and bounds of `Rays`, principled of `Terms`.
-        row, directions, occluded: of `draw` and the scene. table: open-point albedo; without rows, sums are
+        n, t, b, wo: (P, 3) world. alphas: of the glossy lobes. sampled: counts, bounds and slots of `Rays`, principled of
+        `Terms`. rays: of `draw`, occluded: of the scene. table: open-point albedo; without rows, sums are
         plain, see `_scales`, and the light is looked up as it is.
-        seen: pyramid, level_start, fine, block of a `LightSet`; density of `Rays`; number of `Cells`; aimed of `aim`.
+        seen: pyramid, level_start, fine, block, peak of a `LightSet`; density of `Rays`; number of `Cells`; aimed of `aim`.
         where: each point's row of `out` and `gap`, and the place of each sum in it.
         out: (..., CHANNELS), written. gap: as `out`, written: the estimate from the first half of the rays less that
         from the second.
     """
     f32 = np.float32
-    counts, bounds, principled = sampled
-    texels, level_start, fine, block, light_density, cells, aimed = seen
+    counts, bounds, slots, principled = sampled
+    _, directions, drawn, drawn_density, row = rays
+    texels, level_start, fine, block, peak, light_density, cells, aimed = seen
     lights = len(cells)
-    points, slots = row.shape
+    points, most = row.shape
+    most = -(-most // LANES) * LANES
     terms, levels = table.shape[1], len(level_start)
-    dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
-    s5, sin2, cos2 = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
-    scratch = (s5, sin2, cos2, np.empty(slots, np.float32))
-    density, inverse = np.empty(slots, np.float32), np.empty(slots, np.float32)
+    dx, dy, dz = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
+    s5, sin2, cos2 = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
+    scratch = (s5, sin2, cos2, np.empty(most, np.float32))
+    density, inverse = np.empty(most, np.float32), np.empty(most, np.float32)
     bits = inverse.view(np.int32)
-    us, vs, level = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.int32)
-    visible = np.empty(slots, np.bool_)
-    weights = np.empty(terms * slots, np.float32)
-    smooth_light, bright_light = np.empty((slots, CHANNELS), np.float32), np.empty((slots, CHANNELS), np.float32)
-    smooth, bright = np.zeros((2, terms, CHANNELS), np.float32), np.zeros((2, terms, CHANNELS), np.float32)
-    normaliser = np.empty((2, terms), np.float32)
+    us, vs, level = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.int32)
+    ray, light = np.empty(most, np.int32), np.empty(most, np.int32)
+    weights = np.empty(terms * most, np.float32)
+    radiance = np.empty((most, 2 * CHANNELS), np.float32)  # of the residual, then of the excess
+    total = np.empty((2, terms, 2 * CHANNELS), np.float32)
     texel_angle = 4 * math.pi / (SQUARE * SQUARE)
     filtering = f32(0.25 / texel_angle) if len(table) > 0 else f32(0)
     for p in range(points):
@@ -369,17 +398,15 @@ def accumulate(  # type: ignore[no-untyped-def]
                     r = row[p, s]
                     if r >= 0 and not (is_light and occluded[r]):
                         dx[m], dy[m], dz[m] = directions[r, 0], directions[r, 1], directions[r, 2]
-                        visible[m] = not occluded[r]
+                        ray[m], light[m] = r, slots[s, 0] - len(counts)
                         m += 1
-            weight = weights[: terms * m].reshape((terms, m))
-            weigh(n, t, b, wo, p, (dx, dy, dz), m, alphas, counts, principled, scratch, density, inverse, weight)
-            for j in range(terms):
-                total = f32(0)
-                for i in range(lobes):
-                    total += weight[j, i]
-                normaliser[half, j] = total
-            # what each ray sees
-            for i in range(m):
+            count = -(-m // LANES) * LANES  # whole vectors: the rays that fill them up see nothing
+            dx[m:count], dy[m:count], dz[m:count] = n[p, 0], n[p, 1], n[p, 2]
+            weight = weights[: terms * count].reshape((terms, count))
+            weigh(n, t, b, wo, p, (dx, dy, dz), count, alphas, counts, principled, scratch, density, inverse, weight)
+            radiance[:count] = 0
+            radiance[:lobes, WEIGHT] = 1
+            for i in range(min(-(-lobes // LANES) * LANES, count)):  # where lobe rays look
                 a = math.sqrt(max(f32(1) - abs(dz[i]), f32(0)))
                 v = arctan_turns(abs(dy[i]), abs(dx[i])) * a
                 u = a - v
@@ -389,60 +416,71 @@ def accumulate(  # type: ignore[no-untyped-def]
                 vs[i] = (v if dy[i] >= 0 else -v) * f32(0.5) + f32(0.5)
                 inverse[i] = inverse[i] * filtering  # an eighth of 2 x, the nearest level: finer, for less bias
                 level[i] = min(max(((bits[i] >> 23) - 127) >> 1, 0), levels - 1)
-            smooth_light[:m] = 0
-            bright_light[:m] = 0
-            found_bright = False
-            for i in range(m):
-                if not visible[i]:
+            for i in range(lobes):
+                if occluded[ray[i]]:
                     continue
-                if i < lobes:
-                    size = SQUARE >> level[i]
-                    x, y = us[i] * f32(size) + f32(0.5), vs[i] * f32(size) + f32(0.5)
-                    left, top = int(x), int(y)
-                    x, y = x - f32(left), y - f32(top)
-                    above = level_start[level[i]] + top * (size + 2) + left
-                    below = above + size + 2
-                    w00, w01, w10, w11 = (f32(1) - x) * (f32(1) - y), x * (f32(1) - y), (f32(1) - x) * y, x * y
-                    for c in range(CHANNELS):
-                        smooth_light[i, c] = (
-                            w00 * texels[above, c]
-                            + w01 * texels[above + 1, c]
-                            + w10 * texels[below, c]
-                            + w11 * texels[below + 1, c]
-                        )
+                size = SQUARE >> level[i]
+                x, y = us[i] * f32(size) + f32(0.5), vs[i] * f32(size) + f32(0.5)
+                left, top = int(x), int(y)
+                x, y = x - f32(left), y - f32(top)
+                above = level_start[level[i]] + top * (size + 2) + left
+                below = above + size + 2
+                w00, w01, w10, w11 = (f32(1) - x) * (f32(1) - y), x * (f32(1) - y), (f32(1) - x) * y, x * y
+                for c in range(WEIGHT):
+                    radiance[i, c] = (
+                        w00 * texels[above, c]
+                        + w01 * texels[above + 1, c]
+                        + w10 * texels[below, c]
+                        + w11 * texels[below + 1, c]
+                    )
                 column, line = min(int(us[i] * f32(FINE)), FINE - 1), min(int(vs[i] * f32(FINE)), FINE - 1)
                 number = block[line >> 1, column >> 1]
                 if number >= 0:
-                    found_bright = True
                     texel = 4 * number + 2 * (line & 1) + (column & 1)
-                    whole = density[i]
                     for e in range(lights):
                         cell = cells[e, line >> CELL_SHIFT, column >> CELL_SHIFT]
                         if cell >= 0:
-                            whole += light_density[texel, e] * aimed[p, cell]
-                    share = density[i] / whole
-                    for c in range(CHANNELS):
-                        bright_light[i, c] = share * fine[texel, c]
-            np.dot(weight, smooth_light[:m], smooth[half])
-            if found_bright:
-                np.dot(weight, bright_light[:m], bright[half])
-            else:
-                bright[half] = 0
+                            share = density[i] / (density[i] + light_density[texel, e] * aimed[p, cell])
+                            for c in range(3 * e, 3 * e + 3):
+                                radiance[i, CHANNELS + c] = share * fine[texel, c]
+            for i in range(lobes, m):
+                share = density[i] / (density[i] + drawn_density[ray[i]])
+                for c in range(3):
+                    radiance[i, CHANNELS + 3 * light[i] + c] = share * peak[drawn[ray[i]], c]
+            np.dot(weight, radiance[:count], total[half])
         for j in range(terms):
-            scale, scale0, scale1 = _scales(table, n, wo, p, j, normaliser)
+            scale, scale0, scale1 = _scales(table, n, wo, p, j, total[0, j, WEIGHT], total[1, j, WEIGHT])
+            total[0, j, WEIGHT] = total[1, j, WEIGHT] = 0
             target, place = where[0][p], where[1][j]
             for c in range(CHANNELS):
-                out[target, place, c] = (smooth[0, j, c] + smooth[1, j, c]) * scale + bright[0, j, c] + bright[1, j, c]
-                gap[target, place, c] = (
-                    smooth[0, j, c] * scale0
-                    - smooth[1, j, c] * scale1
-                    + f32(2) * (bright[0, j, c] - bright[1, j, c])
-                )
+                smooth0, smooth1 = total[0, j, c], total[1, j, c]
+                bright0, bright1 = total[0, j, CHANNELS + c], total[1, j, CHANNELS + c]
+                out[target, place, c] = (smooth0 + smooth1) * scale + bright0 + bright1
+                gap[target, place, c] = smooth0 * scale0 - smooth1 * scale1 + f32(2) * (bright0 - bright1)
+
+
+@fast
+def mirror(radiance, rays, occluded, weights, where, first, out):  # type: ignore[no-untyped-def]
+    """What the last ray of each point, the mirror direction's, shows of one environment.
+
+    Args:
+        radiance: (H, W, 3). rays: of `draw`, occluded: of the scene. weights: (2, P), of what is shown in two sums.
+        where: each point's row of `out` and the places of those sums in it. first: channel of the environment.
+    """
+    _, directions, _, _, row = rays
+    seen = np.empty(3, np.float64)
+    for p in range(len(row)):
+        r = row[p, row.shape[1] - 1]
+        if r >= 0 and not occluded[r]:
+            look_up(radiance, directions[r], seen)
+            for j in range(2):
+                for c in range(3):
+                    out[where[0][p], where[1][j], first + c] = weights[j, p] * seen[c]
 
 
 @fast
 def accumulate_bounce(  # type: ignore[no-untyped-def]
-    n, t, b, wo, alphas, sampled, row, directions, hit, shown, table, where, out, gap
+    n, t, b, wo, alphas, sampled, rays, hit, shown, table, where, out, gap
 ):
     """Add to the sums of each point what its lobe rays see of the surface itself.
 
@@ -450,7 +488,8 @@ def accumulate_bounce(  # type: ignore[no-untyped-def]
         As `accumulate`; the rays are lobe rays only. hit: (R,) number of the surface point that a ray hits, or -1.
         shown: (H, sums, CHANNELS), what such a point sends back to it, for each sum.
     """
-    counts, bounds, principled = sampled
+    counts, bounds, _, principled = sampled
+    _, directions, _, _, row = rays
     points, slots = row.shape
     terms = table.shape[1]
     dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
@@ -484,7 +523,7 @@ def accumulate_bounce(  # type: ignore[no-untyped-def]
         if not any_hit:
             continue
         for j in range(terms):
-            scale, scale0, scale1 = _scales(table, n, wo, p, j, normaliser)
+            scale, scale0, scale1 = _scales(table, n, wo, p, j, normaliser[0, j], normaliser[1, j])
             target, place = where[0][p], where[1][j]
             for c in range(CHANNELS):
                 out[target, place, c] += (total[0, j, c] + total[1, j, c]) * scale

@@ -6,10 +6,10 @@ import pytest
 from stages.core.color import luminance
 from stages.light import light_set as module
 from stages.light.environment import Environment, directions_of_texels
-from stages.light.light_set import CELLS, FINE, LightSet, light_set, split
-from stages.light.octahedral import direction_to_square, octahedral, square_to_direction
+from stages.light.light_set import CELLS, CUT, FINE, LARGEST_CELL, LightSet, Texels, light_set, split
+from stages.light.octahedral import direction_to_square, octahedral, square_to_direction, texel_directions
 from stages.light.transport import share_out
-from stages.light.transport_kernels import _in_cell
+from stages.light.transport_kernels import _in_cell, on_square
 
 
 def gradient(height: int) -> np.ndarray:
@@ -83,15 +83,52 @@ def test_densities_and_cells_cover_the_excess() -> None:
     cells = lights.cells
     assert cells.first.tolist()[:2] == [0, 0]
     assert cells.energy.sum() == pytest.approx(1, abs=1e-5)
-    assert lights.cumulative[-1] == pytest.approx(1)
+    assert lights.texels.cumulative[-1] == pytest.approx(1)
     side = FINE // CELLS
+    x, y, z = texel_directions(FINE)
     for k, (start, end) in enumerate(cells.begin):
-        texels = lights.texels[start:end]
-        assert (cells.number[1, texels // FINE // side, texels % FINE // side] == k).all()
-        share = density[texels // FINE, texels % FINE, 1].sum()
-        assert cells.energy[k] == pytest.approx(share, rel=1e-4)
-    assert (cells.number >= 0).sum() == len(cells.begin)
+        row, column = np.divmod(lights.texels.place[start:end], FINE)
+        assert (cells.number[1, row // side, column // side] == k).all()
+        assert cells.energy[k] == pytest.approx(density[row, column, 1].sum(), rel=1e-4)
+        assert len(row) <= np.pi * cells.radius[k] ** 2 / (4 * np.pi / FINE**2) * 1.001  # no more than its area holds
+        away = np.arccos((np.stack([x, y, z], -1)[row, column] @ cells.direction[:, k]).clip(-1, 1))
+        assert away.max() < 3 * cells.radius[k]
+    assert sorted(set(cells.number[cells.number >= 0])) == list(range(len(cells.begin)))
+    shown = texels_of(lights, lights.fine[:, 3:6])
+    row, column = np.divmod(lights.texels.place, FINE)
+    assert lights.texels.radiance == pytest.approx(shown[row, column])
     assert module.MAX_LIGHTS * 3 <= module.CHANNELS
+
+
+def test_cells_are_cut_where_it_is_bright() -> None:
+    energy = np.random.default_rng(3).random((FINE, FINE)) ** 40
+    energy[:64, :64] *= 1e-6
+    energy[300, 40] = 500.0
+    energy /= energy.sum()
+    row, column = np.mgrid[:FINE, :FINE].reshape(2, -1)
+    code = module._morton(row, column)
+    order = np.argsort(code)
+    corner, across = module._cut(code[order], energy.ravel()[order])
+    square = np.empty((FINE, FINE), np.int64)
+    square[row[order], column[order]] = across
+
+    def check(y: int, x: int, size: int) -> None:
+        """A square of FINE / size texels is cut if it is bright, and not otherwise."""
+        width = FINE // size
+        inside = square[y : y + width, x : x + width]
+        if size < CELLS and energy[y : y + width, x : x + width].sum() > CUT * (size / 16) ** 2:
+            assert (inside > size).all()
+            for j in (0, width // 2):
+                for i in (0, width // 2):
+                    check(y + j, x + i, 2 * size)
+        else:
+            assert (inside == size).all()
+
+    for y in range(0, FINE, FINE // LARGEST_CELL):
+        for x in range(0, FINE, FINE // LARGEST_CELL):
+            check(y, x, LARGEST_CELL)
+    assert set(across) == {8, 16, 32, 64}
+    assert len(np.unique(corner)) == round(float(((square / FINE) ** 2).sum()))
 
 
 def test_light_rays_go_where_they_are_needed() -> None:
@@ -112,15 +149,38 @@ def test_a_lamp_of_one_texel_is_hit_in_every_environment() -> None:
     places = [(100, 40), (300, 411)]
     for e, (row, column) in enumerate(places):
         energy[row, column, e] = 1.0
-    texels, cumulative, cells = module._cells(energy)
+    texels, cells = module._cells(energy, [np.ones((FINE, FINE, 3))] * 2)
     for k, (row, column) in enumerate(places):
         for u in (0.0, 0.4, 1.0):
-            found = _in_cell(k, u, 0.5, (texels, cumulative, cells.begin, cells.first))
-            u_found, v_found = direction_to_square(*found)
+            u_found, v_found, texel, share = _in_cell(k, u, 0.5, (texels, cells.begin, cells.first))
             assert (int(v_found * FINE), int(u_found * FINE)) == (row, column)
+            assert (texel, share) == (k, 1)
+
+
+def test_texels_are_drawn_by_their_energy() -> None:
+    """The guided search finds what the obvious one does."""
+    energy = np.zeros((FINE, FINE, 1))
+    energy[128:136, 64:72, 0] = np.random.default_rng(5).random((8, 8)) ** 8  # one cell
+    energy /= energy.sum()
+    texels, cells = module._cells(energy, [np.ones((FINE, FINE, 3))])
+    for k, (start, end) in enumerate(cells.begin):
+        below = texels.cumulative[start - 1] if start else 0.0
+        whole = texels.cumulative[end - 1] - below
+        for u in np.random.default_rng(6).random(500):
+            _, _, texel, share = _in_cell(k, u, 0.5, (texels, cells.begin, cells.first))
+            assert texel == np.searchsorted(texels.cumulative, below + u * whole, "right")
+            assert share == pytest.approx(energy.ravel()[texels.place[texel]] / whole, rel=1e-4)
 
 
 def test_a_cell_of_no_width_gives_a_direction() -> None:
     """Energy that is lost in the rounding of the sum must not make a ray that is not a number."""
-    excess = (np.array([7, 9], np.int32), np.array([1.0, 1.0]), np.array([[0, 1], [1, 2]]), np.array([0, 2]))
-    assert np.isfinite(_in_cell(1, 0.3, 0.5, excess)).all()
+    index = np.array([0, 1], np.int32)
+    texels = Texels(np.array([7, 9], np.int32), np.array([1.0, 1.0]), index, np.ones((2, 3), np.float32))
+    assert np.isfinite(_in_cell(1, 0.3, 0.5, (texels, np.array([[0, 1], [1, 2]]), np.array([0, 2])))).all()
+
+
+def test_directions_in_float32() -> None:
+    places = np.random.default_rng(7).random((3000, 2)).astype(np.float32)
+    places[:5] = [[0.5, 0.5], [0, 0], [1, 1], [0, 1], [0.5, 0]]
+    for u, v in places:
+        assert on_square(u, v) == pytest.approx(square_to_direction(float(u), float(v)), abs=1e-6)

@@ -85,8 +85,8 @@ def alone(count: int) -> Neighbours:
 def test_noisiest_is_judged_as_seen() -> None:
     mean = np.array([1.0, 100.0, 1.0, 1.0], np.float32).reshape(4, 1, 1)
     noise = np.array([0.1, 5.0, 0.3, 0.2], np.float32).reshape(4, 1, 1)
-    assert noisiest(mean, noise, alone(4), 2).tolist() == [2, 3]  # a bright point's noise is not seen
-    assert noisiest(mean, noise, alone(4), 0).tolist() == []
+    assert noisiest(mean, noise, alone(4), (0,), 2).tolist() == [2, 3]  # a bright point's noise is not seen
+    assert noisiest(mean, noise, alone(4), (0,), 0).tolist() == []
 
 
 def test_noisiest_is_what_smoothing_leaves() -> None:
@@ -96,4 +96,4 @@ def test_noisiest_is_what_smoothing_leaves() -> None:
     near.point[rim, 2] = 20.0
     near.n[rim] = [0, 1, 0]
     mean, noise = np.ones((len(rim), 1, 1), np.float32), np.full((len(rim), 1, 1), 0.01, np.float32)
-    assert rim[noisiest(mean, noise, near, int(rim.sum()))].all()
+    assert rim[noisiest(mean, noise, near, (0,), int(rim.sum()))].all()
