@@ -75,6 +75,11 @@ class LightSet:
     lamps: Lamps
     demand: NDArray[np.float64]
 
+    @property
+    def has_excess(self) -> NDArray[np.bool_]:
+        """Which environments have light rays at all."""
+        return np.diff(self.cells.first) > 0
+
 
 class Texels(NamedTuple):
     """The excess texels of one environment after the other, along a Morton curve, on which every cell is a stretch: T in all.

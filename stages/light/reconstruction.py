@@ -23,11 +23,11 @@ from stages.light.gbuffer import GBuffer
 RADIUS = 2
 """Of the window, pixels: it holds every class of a 4 x 4 block of interleaved samples at least once."""
 
-TOLERANCE = 20.0
+TOLERANCE = 12.0
 """A neighbour counts for nothing when its squared difference exceeds this many times the sum of both variances; its own
 is taken for no more than the point's, so that noise does not flow to where there is none."""
 
-TOGETHER = 5.0
+TOGETHER = 8.0
 """Nor does it count when the squared differences of the first sum, diffuse light, exceed this many times what noise explains,
 on average over all lights and colours: what stands in the way of one light stands in the way of others."""
 
@@ -77,7 +77,11 @@ Estimate = tuple[NDArray[np.float32], NDArray[np.float32]]
 
 
 def merge(into: Estimate, rows: NDArray[np.int64], more: Estimate, share: NDArray[np.float32]) -> None:
-    """Average an independent estimate of some points into theirs, in place. Args: share: (rows,) weight of the new one."""
+    """Average an independent estimate of some points into theirs, in place.
+
+    Args:
+        into: (P, sums, channels). more: (rows, sums, channels). share: (rows, channels), weight of the new one.
+    """
     mean, noise, new_mean, new_noise = map(_rows, (*into, *more))
 
     def part(start: int, end: int) -> None:
@@ -96,23 +100,30 @@ def smoothed(
     return _weighted(mean, noise, near, 1, joint)
 
 
-def noisiest(
-    mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, judged: tuple[int, ...], count: int
-) -> NDArray[np.int64]:
-    """Rows of the points with most noise left once smoothed, in tone-mapped sums, x / (1 + x); ascending.
+def noise_left(
+    mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, judged: tuple[int, ...]
+) -> NDArray[np.float32]:
+    """Noise that each point keeps under each light once smoothed, in tone-mapped sums, x / (1 + x): (P, lights) variances.
 
     A point on a thin rim, whose neighbours lie on other surfaces, keeps all its noise; one on a flat loses most of it.
 
     Args:
-        mean, noise: (P, sums, channels). judged: the sums that count.
+        mean, noise: (P, sums, channels), three channels a light. judged: the sums that count.
     """
-    if count == 0:
-        return np.zeros(0, np.int64)
     some, their_noise = (_sums(values, judged) for values in (mean, noise))
     left = _weighted(some, their_noise, near, 2)
-    seen = np.empty(len(left), np.float32)
-    in_parts(lambda start, end: _seen(_rows(some), _rows(left), start, end, seen), len(seen), POINTS_PER_TASK)
-    return np.sort(np.argpartition(-seen, count - 1)[:count])
+    seen = np.empty((len(left), left.shape[2] // 3), np.float32)
+    in_parts(lambda start, end: _seen(some, left, start, end, seen), len(seen), POINTS_PER_TASK)
+    return seen
+
+
+def largest(values: NDArray[np.float32], share: float) -> NDArray[np.bool_]:
+    """Where the largest of some values are, that share of them all."""
+    result = np.zeros(values.shape, np.bool_)
+    count = int(share * values.size)
+    if count:
+        result.reshape(-1)[np.argpartition(-values, count - 1, None)[:count]] = True
+    return result
 
 
 def _sums(values: NDArray[np.float32], which: tuple[int, ...]) -> NDArray[np.float32]:
@@ -155,21 +166,25 @@ def in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
 @fast
 def _merge(mean, noise, rows, new_mean, new_noise, share, start, end):  # type: ignore[no-untyped-def]
     for i in range(start, end):
-        p, w = rows[i], share[i]
+        p = rows[i]
         for k in range(mean.shape[1]):
+            w = share[i, k % share.shape[1]]
             mean[p, k] += w * (new_mean[i, k] - mean[p, k])
             noise[p, k] = (np.float32(1) - w) ** 2 * noise[p, k] + w * w * new_noise[i, k]
 
 
 @fast
 def _seen(mean, noise, start, end, result):  # type: ignore[no-untyped-def]
-    """Noise of each point in its tone-mapped sums."""
+    """Noise in the tone-mapped sums, of each point and light."""
+    total = np.empty(mean.shape[2], np.float32)
     for p in range(start, end):
-        total = np.float32(0)
+        total[:] = 0
         for k in range(mean.shape[1]):
-            square = (np.float32(1) + max(mean[p, k], np.float32(0))) ** 2
-            total += noise[p, k] / (square * square)
-        result[p] = total
+            for c in range(mean.shape[2]):
+                square = (np.float32(1) + max(mean[p, k, c], np.float32(0))) ** 2
+                total[c] += noise[p, k, c] / (square * square)
+        for e in range(result.shape[1]):
+            result[p, e] = total[3 * e] + total[3 * e + 1] + total[3 * e + 2]
 
 
 @fast

@@ -5,6 +5,8 @@ in world units serves every source scale.
 """
 
 from dataclasses import dataclass
+from threading import Lock
+from typing import Any
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
@@ -25,8 +27,37 @@ class Hits:
     barycentric: NDArray[np.float32]
 
 
+class _Tree:
+    """Embree's tree over a mesh, built by the first query: 2 s for a million triangles.
+
+    robust: watertight, and slower.
+    """
+
+    def __init__(self, vertices: NDArray, triangles: NDArray, robust: bool) -> None:
+        self._mesh = vertices, triangles, robust
+        self._lock = Lock()
+        self._embree: EmbreeScene | None = None
+
+    def run(self, origins: NDArray, directions: NDArray, **query: object) -> Any:
+        """Embree's answer to R rays, (R, 3) each."""
+        with self._lock:
+            if self._embree is None:
+                self._embree = self._build(*self._mesh)
+        o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
+        return self._embree.run(o, d, **query)
+
+    def _build(self, vertices: NDArray, triangles: NDArray, robust: bool) -> EmbreeScene:
+        scene = EmbreeScene(robust=robust)
+        self._kept = TriangleMesh(scene, vertices, triangles)
+        scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")
+        return scene
+
+
 class Scene:
     """A triangle mesh ready for ray queries; safe to use from several threads, which run in parallel.
+
+    Closest hits are watertight. Occlusion is not, and a fifth faster for it: of 46 million rays of a view's transport, on four
+    meshes, one slipped through between two triangles.
 
     Args:
         vertices: (V, 3) float32 world. triangles: (F, 3) int32. normals: (F, 3, 3) float32 unit, per corner.
@@ -36,15 +67,11 @@ class Scene:
         self.vertices = np.ascontiguousarray(vertices, np.float32)
         self.triangles = np.ascontiguousarray(triangles, np.int32)
         self.normals = np.ascontiguousarray(normals, np.float32)
-        self._closest, self._any = EmbreeScene(robust=True), EmbreeScene(robust=False)
-        self._meshes = [TriangleMesh(embree, self.vertices, self.triangles) for embree in (self._closest, self._any)]
-        for embree in (self._closest, self._any):
-            embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32), query="OCCLUDED")  # builds the tree, once
+        self._closest, self._any = (_Tree(self.vertices, self.triangles, robust) for robust in (True, False))
 
     def intersect(self, origins: NDArray, directions: NDArray) -> Hits:
         """Closest hit of each ray. Args: (R, 3) each; directions need not be unit: t is in their length."""
-        o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
-        hit = self._closest.run(o, d, query="INTERSECT", output=True)
+        hit = self._closest.run(origins, directions, query="INTERSECT", output=True)
         mask = hit["primID"] >= 0
         u, v = np.where(mask, hit["u"], 0), np.where(mask, hit["v"], 0)
         barycentric = np.stack([1 - u - v, u, v], -1).astype(np.float32)
@@ -52,8 +79,7 @@ class Scene:
 
     def occluded(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
         """Whether anything lies along each ray, at any distance. Args: (R, 3) each."""
-        o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
-        return self._any.run(o, d, query="OCCLUDED") >= 0
+        return self._any.run(origins, directions, query="OCCLUDED") >= 0
 
     def shaded_smooth(self) -> "Scene":
         """The same mesh with normals that are smooth over every edge: at a vertex, its faces' by the angle they have there.

@@ -14,9 +14,10 @@ every term, every roughness and every environment:
   multiplied by the exact unoccluded albedo, so an evenly lit open point has no error at all;
 - what rises above the bound (a sun, a lamp) has rays of its own, aimed at what the point would reflect most of, and
   combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles;
-- neighbouring pixels use complementary samples; the points that turn out noisiest trace more; and what noise is left is
-  averaged over neighbours that do not differ by more than it (`stages.light.reconstruction`), less the highlights that a
-  lamp would make in the open (`stages.light.highlights`), which averaging would flatten.
+- neighbouring pixels use complementary samples; the points that turn out noisiest trace more, towards the lights that make
+  them so; and what noise is left is averaged over neighbours that do not differ by more than it
+  (`stages.light.reconstruction`), less the highlights that a lamp would make in the open (`stages.light.highlights`), which
+  averaging would flatten.
 
 These errors fall as rays are added. What stays is the resolution of the lights, 0.4 degrees (`stages.light.light_set`), under
 what roughness 0.08 spreads; a mirror looks up the light itself. The result depends on seed and pixel only, not on threads.
@@ -70,8 +71,20 @@ class Quality:
         return replace(self, lobe=max(2, round(self.lobe * factor)), light=max(2, round(self.light * factor)))
 
 
-EXTRA = ((0.15, 3.0), (0.02, 14.0))
-"""Rounds of further rays: for which share of the points, the noisiest by then, and how many times what all began with."""
+@dataclass(frozen=True)
+class Round:
+    """Further rays where most noise is left: at a share of the points or, if `each`, of the points under each light for itself.
+
+    lobe, light: times the rays that every point begins with.
+    """
+
+    share: float
+    lobe: float
+    light: float
+    each: bool
+
+
+EXTRA = (Round(0.1, 3.0, 3.0, each=False), Round(0.02, 3.0, 10.0, each=True))
 
 SEED_STEP = 0x5EED
 """Between the seed of a point's rays and that of its further ones."""
@@ -89,7 +102,7 @@ AIM = np.array([alpha_from_roughness(r) for r in (0.33, 1.0)], np.float32)
 class Sums:
     """What a point gathers, for all environments: (P, stored, CHANNELS) float32, and the variance of each.
 
-    rays: (P,) float32, traced for a point, as a multiple of what every point begins with.
+    rays: (P, lights) float32, traced for a point under a light, as a multiple of what every point begins with.
     """
 
     mean: NDArray[np.float32]
@@ -150,11 +163,12 @@ def gather(
 ) -> Sums:
     """The sums of every point, with further rays where they are noisiest."""
     sums = trace(scene, points, lights, quality, seed, terms)
-    for i, (share, factor) in enumerate(EXTRA if quality.extra else (), 1):
-        count = int(share * len(points.n))
-        worst = reconstruction.noisiest(sums.mean, sums.variance, near, terms.judged, count)
-        more = trace(scene, points[worst], lights, quality.scaled(factor), seed + i * SEED_STEP, terms)
-        add(sums, worst, more, factor)
+    for i, more in enumerate(EXTRA if quality.extra else (), 1):
+        wanted = noisiest(sums, near, lights, terms, more)
+        rows = np.flatnonzero(wanted.any(1))
+        some = replace(quality, lobe=round(quality.lobe * more.lobe), light=round(quality.light * more.light))
+        found = trace(scene, points[rows], lights, some, seed + i * SEED_STEP, terms, wanted[rows])
+        add(sums, rows, found, wanted[rows] * np.float32(more.light))
     return sums
 
 
@@ -173,22 +187,46 @@ def smoothed(
     return result
 
 
-def add(sums: Sums, rows: NDArray[np.int64], more: Sums, factor: float) -> None:
-    """Average further rays into some points, in place; `more` holds `factor` times the rays that any point began with."""
-    reconstruction.merge((sums.mean, sums.variance), rows, (more.mean, more.variance), factor / (sums.rays[rows] + factor))
-    sums.rays[rows] += factor
+def noisiest(
+    sums: Sums, near: reconstruction.Neighbours, lights: LightSet, terms: Terms, more: Round
+) -> NDArray[np.bool_]:
+    """Which points trace a round of further rays, and for which lights: (P, lights)."""
+    left = reconstruction.noise_left(sums.mean, sums.variance, near, terms.judged)[:, : len(lights.environments)]
+    if more.each:
+        return reconstruction.largest(np.where(lights.has_excess, left, 0), more.share)
+    return reconstruction.largest(left.sum(1, keepdims=True), more.share).repeat(left.shape[1], 1)
 
 
-def trace(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int, terms: Terms = GLTF) -> Sums:
-    """The sums of every point by Monte Carlo, each on its own."""
+def add(sums: Sums, rows: NDArray[np.int64], more: Sums, rays: NDArray[np.float32]) -> None:
+    """Average further rays into some points, in place. Args: rays: (rows, lights), how many, 0 to leave a light as it is."""
+    share = np.zeros((len(rows), CHANNELS), np.float32)
+    share[:, : 3 * rays.shape[1]] = (rays / (sums.rays[rows] + rays)).repeat(3, 1)
+    reconstruction.merge((sums.mean, sums.variance), rows, (more.mean, more.variance), share)
+    sums.rays[rows] += rays
+
+
+def trace(
+    scene: Scene,
+    points: GBuffer,
+    lights: LightSet,
+    quality: Quality,
+    seed: int,
+    terms: Terms = GLTF,
+    wanted: NDArray[np.bool_] | None = None,
+) -> Sums:
+    """The sums of every point by Monte Carlo, each on its own. Args: wanted: (P, lights), the rest is of no use; or all."""
+    count = len(points.n), len(lights.environments)
+    wanted = np.ones(count, np.bool_) if wanted is None else wanted
     mean, gap = np.empty((2, len(points.n), terms.stored, CHANNELS), np.float32)
     rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
-        list(pool.map(lambda part: _tile(scene, points, lights, terms, rays, pixel[part], part, mean, gap), parts))
+        list(pool.map(lambda part: _tile(scene, points, lights, terms, rays, pixel[part], part, wanted, mean, gap), parts))
+    if not wanted.all():
+        gap[..., : 3 * count[1]] *= wanted.repeat(3, 1)[:, None]  # nor is its noise any to judge others by
     variance = reconstruction.variance(gap, reconstruction.Neighbours.of(points))
-    return Sums(mean, variance, np.ones(len(mean), np.float32))
+    return Sums(mean, variance, np.ones(count, np.float32))
 
 
 def _tile(
@@ -199,6 +237,7 @@ def _tile(
     rays: "Rays",
     pixel: NDArray,
     part: NDArray,
+    wanted: NDArray,
     mean: NDArray,
     gap: NDArray,
 ) -> None:
@@ -206,10 +245,11 @@ def _tile(
     n, wo, origin, cells = points.n[part], points.wo[part], points.origin[part], lights.cells
     frame, alphas = (n, *tangent_frame(n)), terms.alphas
     chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
-    aim(n, wo, AIM, (cells.direction, cells.radius, cells.energy, cells.first), chosen, aimed)
+    aim(n, wo, wanted[part], AIM, (cells.direction, cells.radius, cells.energy, cells.first), chosen, aimed)
     drawn = rays.draw(frame, wo, origin, pixel, alphas, lights, chosen)
     occluded = scene.occluded(drawn.origin, drawn.direction)
-    seen = (lights.pyramid, lights.level_start, lights.fine, lights.block, lights.texels.radiance, rays.density, cells.number, aimed)
+    excess = (lights.fine, lights.block, lights.texels.radiance, rays.density, cells.number, aimed)
+    seen = (lights.pyramid, lights.level_start, *excess)
     sampled = (rays.counts, rays.bounds, rays.slots, terms.principled)
     where = (part, terms.summed)
     accumulate(*frame, wo, alphas, sampled, drawn, occluded, rays.table, seen, where, mean, gap)
@@ -288,7 +328,7 @@ class Rays:
         excess = (lights.texels, lights.cells.begin, lights.cells.first)
         samples = (self.slots, self.shift, self.turn, self.jitter, self.seed)
         used = draw(*frame, wo, origin, pixel, samples, alphas, excess, chosen, rays)
-        return Drawn(*(values[:used] for values in rays[:-1]), rays.row)
+        return Drawn(origins[:used], directions[:used], texel[:used], density[:used], rays.row)
 
 
 class Drawn(NamedTuple):
@@ -312,11 +352,10 @@ def share_out(light: int, lights: LightSet) -> NDArray[np.int64]:
     """
     if light == 0:
         return np.zeros(len(lights.environments), np.int64)
-    has_excess = np.diff(lights.cells.first) > 0
-    demand = np.where(has_excess, lights.demand + 1e-9, 0.0)
-    shares = demand / max(demand.sum(), np.finfo(float).tiny) * has_excess.sum()
+    demand = np.where(lights.has_excess, lights.demand + 1e-9, 0.0)
+    shares = demand / max(demand.sum(), np.finfo(float).tiny) * lights.has_excess.sum()
     rays = light * (EVEN + (1 - EVEN) * shares)
-    return np.where(has_excess, 2 * np.maximum(1, np.round(rays / 2)), 0).astype(np.int64)
+    return np.where(lights.has_excess, 2 * np.maximum(1, np.round(rays / 2)), 0).astype(np.int64)
 
 
 def _slots(counts: NDArray, first: int) -> NDArray[np.int64]:

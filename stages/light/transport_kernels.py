@@ -10,7 +10,6 @@ from stages.core.albedo import COSINE_STEPS, MIN_COSINE
 from stages.light.blender import F0, burley, fresnel
 from stages.light.environment import look_up
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
-from stages.light.octahedral import square_to_direction
 
 CLASSES = 64
 """Pixels of an 8 x 8 block each use a sample set of their own; together they stratify the hemisphere 64 times finer."""
@@ -55,14 +54,15 @@ def hashed(x, y):  # type: ignore[no-untyped-def]
 
 
 @fast
-def aim(n, wo, alphas, cells, chosen, share):  # type: ignore[no-untyped-def]
+def aim(n, wo, wanted, alphas, cells, chosen, share):  # type: ignore[no-untyped-def]
     """How much of each cell of the excess a point would reflect if nothing stood in the way.
 
     A light ray is drawn from a cell in proportion to its energy times the BRDF there, summed over a white diffuse and a
     few glossy materials: product importance sampling, without visibility.
 
     Args:
-        n, wo: (P, 3). alphas: of the glossy lobes. cells: direction, radius, energy and first of `Cells`.
+        n, wo: (P, 3). wanted: (P, lights), no ray is drawn for the others. alphas: of the glossy lobes. cells: direction,
+        radius, energy and first of `Cells`.
         chosen, share: (P, K), written: probability of each cell among its environment's, and that over its energy.
     """
     f32 = np.float32
@@ -92,7 +92,7 @@ def aim(n, wo, alphas, cells, chosen, share):  # type: ignore[no-untyped-def]
             total = f32(0)
             for k in range(first[e], first[e + 1]):
                 total += share[p, k] * energy[k]
-            inverse = f32(1) / total if total > 0 else f32(0)
+            inverse = f32(1) / total if total > 0 and wanted[p, e] else f32(0)
             for k in range(first[e], first[e + 1]):
                 share[p, k] *= inverse
                 chosen[p, k] = share[p, k] * energy[k]

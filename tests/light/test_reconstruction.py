@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stages.light.reconstruction import Neighbours, noisiest, smoothed, variance
+from stages.light.reconstruction import Neighbours, largest, noise_left, smoothed, variance
 
 
 def plane(height: int = 32, width: int = 40) -> Neighbours:
@@ -82,18 +82,29 @@ def alone(count: int) -> Neighbours:
     return near
 
 
-def test_noisiest_is_judged_as_seen() -> None:
-    mean = np.array([1.0, 100.0, 1.0, 1.0], np.float32).reshape(4, 1, 1)
-    noise = np.array([0.1, 5.0, 0.3, 0.2], np.float32).reshape(4, 1, 1)
-    assert noisiest(mean, noise, alone(4), (0,), 2).tolist() == [2, 3]  # a bright point's noise is not seen
-    assert noisiest(mean, noise, alone(4), (0,), 0).tolist() == []
+def test_noise_is_judged_as_seen() -> None:
+    """A bright point's noise is not seen; that of each light, three channels, counts for itself."""
+    mean, noise = np.ones((3, 1, 6), np.float32), np.zeros((3, 1, 6), np.float32)
+    mean[1, 0, :3] = 99.0
+    noise[:2, 0, :3] = 1.0
+    noise[2, 0, 3] = 4.0
+    left = noise_left(mean, noise, alone(3), (0,))
+    assert left == pytest.approx(np.array([[3 / 2**4, 0], [3 / 100**4, 0], [0, 4 / 2**4]], np.float32))
 
 
-def test_noisiest_is_what_smoothing_leaves() -> None:
+def test_noise_left_is_what_smoothing_leaves() -> None:
     """A thin rim in front of a wall: as noisy as the wall, but with fewer neighbours to share the noise with."""
     near = plane()
     rim = near.pixel[:, 1] == 12
     near.point[rim, 2] = 20.0
     near.n[rim] = [0, 1, 0]
-    mean, noise = np.ones((len(rim), 1, 1), np.float32), np.full((len(rim), 1, 1), 0.01, np.float32)
-    assert rim[noisiest(mean, noise, near, (0,), int(rim.sum()))].all()
+    mean, noise = np.ones((len(rim), 1, 3), np.float32), np.full((len(rim), 1, 3), 0.01, np.float32)
+    left = noise_left(mean, noise, near, (0,))
+    assert (largest(left, rim.mean())[:, 0] == rim).all()
+
+
+def test_largest() -> None:
+    values = np.array([[3, 1], [2, 9], [4, 0]], np.float32)
+    assert largest(values, 0.5).tolist() == [[True, False], [False, True], [True, False]]
+    assert not largest(values, 0.0).any()
+    assert largest(np.ones((10, 1), np.float32), 0.3).sum() == 3

@@ -9,9 +9,12 @@ from stages.core.color import reinhard
 from stages.core.shading import F0, KNOTS, Transport
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
+from stages.light.light_set import light_set
+from stages.light.reconstruction import Neighbours
 from stages.light.reference import reference_transport
 from stages.light.scene import Scene
-from stages.light.transport import QUALITY, Quality, light_transport
+from stages.light.terms import GLTF
+from stages.light.transport import QUALITY, Quality, Round, add, light_transport, noisiest, trace
 from tests.light import scenes
 
 
@@ -103,3 +106,36 @@ def test_environments_do_not_influence_each_other_in_the_mean() -> None:
     apart = [light_transport(scene, points, [light], QUALITY["high"], 1)[0] for light in lights]
     alone = [reinhard(stacked(t)).mean() for t in apart]
     assert [float(t) for t in together] == pytest.approx([float(a) for a in alone], rel=5e-3)
+
+
+def test_further_rays_serve_the_lights_that_need_them() -> None:
+    """The sums of a light that asked for none stay what they were; the noise of the others falls."""
+    even = Environment("even", np.ones((8, 16, 3), np.float32))
+    scene = scenes.box_in_corner()
+    points = scenes.view_of(scene, 64)
+    lights = light_set([even, scenes.sunny_light()])
+    near = Neighbours.of(points)
+    sums = trace(scene, points, lights, Quality(8, 4), 0)
+    before, more = sums.mean.copy(), Round(0.1, 3.0, 10.0, each=True)
+    wanted = noisiest(sums, near, lights, GLTF, more)
+    assert not wanted[:, 0].any()  # it has no light rays
+    assert wanted[:, 1].sum() == int(0.2 * len(points.n))
+    rows = np.flatnonzero(wanted.any(1))
+    found = trace(scene, points[rows], lights, Quality(24, 40), 1, GLTF, wanted[rows])
+    add(sums, rows, found, wanted[rows] * np.float32(10))
+    assert (sums.mean[..., :3] == before[..., :3]).all()
+    truth = trace(scene, points[rows], lights, Quality(800, 800), 2).mean[:, 0, 3:6]
+    error = [float(np.square(mean[rows, 0, 3:6] - truth).mean() ** 0.5) for mean in (before, sums.mean)]
+    assert error[1] < 0.5 * error[0]
+    assert (sums.rays == np.where(wanted, 11, 1)).all()
+
+
+@pytest.mark.parametrize("make", [scenes.box_in_corner, lambda: scenes.sphere(4)])
+def test_occlusion_is_that_there_is_a_hit(make) -> None:  # type: ignore[no-untyped-def]
+    """The two trees agree, but for a ray in a million that meets an edge exactly."""
+    scene, generator = make(), np.random.default_rng(4)
+    origins = generator.uniform(-1, 1, (200_000, 3)).astype(np.float32)
+    directions = generator.normal(size=origins.shape).astype(np.float32)
+    occluded, hit = scene.occluded(origins, directions), scene.intersect(origins, directions).mask
+    assert 0.05 < occluded.mean() < 0.95
+    assert (occluded != hit).sum() <= 1
