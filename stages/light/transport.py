@@ -51,6 +51,7 @@ from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, dra
 TILE = 512
 """Points a thread takes at once: their rays stay in its cache."""
 
+
 @dataclass(frozen=True)
 class Quality:
     """How many rays a point traces: `lobe` for the mixture of lobes, `light` for the excess of an average environment.
@@ -73,9 +74,9 @@ class Quality:
 
 @dataclass(frozen=True)
 class Round:
-    """Further rays where most noise is left: at a share of the points or, if `each`, of the points under each light for itself.
+    """Further rays where most noise is left: at a share of the points or, if `each`, of the pairs of a point and a light.
 
-    lobe, light: times the rays that every point begins with.
+    lobe, light: times the rays that every point begins with. A light of a pair must have light rays; the others gain nothing.
     """
 
     share: float
@@ -84,7 +85,8 @@ class Round:
     each: bool
 
 
-EXTRA = (Round(0.1, 3.0, 3.0, each=False), Round(0.02, 3.0, 10.0, each=True))
+EXTRA = (Round(0.1, 3.0, 3.0, each=False), Round(0.025, 3.0, 10.0, each=True))
+"""Without them a view takes three quarters of the time; the 99.9th percentile of its error under a studio is twice as high."""
 
 SEED_STEP = 0x5EED
 """Between the seed of a point's rays and that of its further ones."""
@@ -193,7 +195,9 @@ def noisiest(
     """Which points trace a round of further rays, and for which lights: (P, lights)."""
     left = reconstruction.noise_left(sums.mean, sums.variance, near, terms.judged)[:, : len(lights.environments)]
     if more.each:
-        return reconstruction.largest(np.where(lights.has_excess, left, 0), more.share)
+        wanted = np.zeros(left.shape, np.bool_)
+        wanted[:, lights.has_excess] = reconstruction.largest(left[:, lights.has_excess], more.share)
+        return wanted
     return reconstruction.largest(left.sum(1, keepdims=True), more.share).repeat(left.shape[1], 1)
 
 
