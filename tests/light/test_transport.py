@@ -101,7 +101,8 @@ def test_same_seed_same_bits_whatever_the_threads(monkeypatch: pytest.MonkeyPatc
 def test_environments_do_not_influence_each_other_in_the_mean() -> None:
     scene = scenes.sphere(3)
     points = scenes.view_of(scene, 24)
-    lights = [scenes.sunny_light(), scenes.even_light()]
+    other = Environment("another sun", 2 * np.roll(scenes.sunny_light().radiance, 50, 1))
+    lights = [scenes.sunny_light(), scenes.even_light(), other]
     together = [reinhard(stacked(t)).mean() for t in light_transport(scene, points, lights, QUALITY["high"], 0)]
     apart = [light_transport(scene, points, [light], QUALITY["high"], 1)[0] for light in lights]
     alone = [reinhard(stacked(t)).mean() for t in apart]
