@@ -100,12 +100,12 @@ def lookup(radiance, directions):  # type: ignore[no-untyped-def]
     """Bilinear radiance along unit directions. Args: (H, W, 3), (N, 3) world. Returns: (N, 3) float64."""
     result = np.empty((len(directions), 3))
     for i in range(len(directions)):
-        look_up(radiance, directions[i], result[i])
+        bilinear(radiance, directions[i], result[i])
     return result
 
 
 @numba.njit(error_model="numpy", cache=True, nogil=True)
-def look_up(radiance, direction, found):  # type: ignore[no-untyped-def]
+def bilinear(radiance, direction, found):  # type: ignore[no-untyped-def]
     """Write the bilinear radiance along one unit direction, (3,), into `found`, (3,)."""
     height, width, _ = radiance.shape
     u = (0.5 - math.atan2(direction[1], direction[0]) / (2 * math.pi)) * width - 0.5

@@ -45,7 +45,7 @@ MAX_LIGHTS = 5
 """Environments that one `LightSet` integrates together; more are taken in turns."""
 
 CHANNELS = 16
-"""Floats of a texel: one cache line, enough for MAX_LIGHTS in RGB."""
+"""Floats of a texel: one cache line, enough for MAX_LIGHTS in RGB and one to spare, which the kernels use."""
 
 
 @dataclass(frozen=True)
@@ -166,14 +166,14 @@ def _cells(energy: NDArray, peaks: Sequence[NDArray]) -> tuple[Texels, Cells]:
         order = np.argsort(code, kind="stable")
         index = index[order]
         corner, across = _cut(code[order], own[index])
-        start = np.flatnonzero(np.diff(corner, prepend=-1))
+        begins = np.diff(corner, prepend=-1) != 0
+        start = np.flatnonzero(begins)
         if len(start):
             radius.append(np.sqrt(4 / across[start] ** 2))
             share.append(np.add.reduceat(own[index], start))
             direction.append([np.add.reduceat((own * axis.ravel())[index], start) for axis in (x, y, z)])
             begin.append(np.stack([start, np.append(start[1:], len(index))], -1) + sum(map(len, texels)))
-            of_texel = np.cumsum(np.diff(corner, prepend=-1) != 0) - 1
-            number[e, index // FINE // side, index % FINE // side] = of_texel + first[-1]
+            number[e, index // FINE // side, index % FINE // side] = np.cumsum(begins) - 1 + first[-1]
         first.append(first[-1] + len(start))
         texels.append(index)
         energies.append(own[index])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from stages.core.albedo import COSINE_STEPS, MIN_COSINE
 from stages.light.blender import F0, burley, fresnel
-from stages.light.environment import look_up
+from stages.light.environment import bilinear
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
 
 CLASSES = 64
@@ -472,7 +472,7 @@ def mirror(radiance, rays, occluded, weights, where, first, out):  # type: ignor
     for p in range(len(row)):
         r = row[p, row.shape[1] - 1]
         if r >= 0 and not occluded[r]:
-            look_up(radiance, directions[r], seen)
+            bilinear(radiance, directions[r], seen)
             for j in range(2):
                 for c in range(3):
                     out[where[0][p], where[1][j], first + c] = weights[j, p] * seen[c]
