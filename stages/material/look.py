@@ -1,0 +1,84 @@
+"""What a substance looks like at some points: colour, roughness, metallic and height, made of the same events."""
+
+from collections.abc import Callable
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.core.color import srgb_decode
+from stages.material.place import Place
+
+Array = NDArray[np.float32]
+
+
+class Look(NamedTuple):
+    """color: (3, P) linear Rec. 709. roughness, metallic: (P,) or a number. height: (P,) or a number, metres above the surface, about
+    0 on average. dye: (P,) or a number, how far a colour that words name applies here: a brick's clay takes it, its mortar does not.
+    """
+
+    color: Array
+    roughness: Array | float
+    metallic: Array | float = 0.0
+    height: Array | float = 0.0
+    dye: Array | float = 1.0
+
+
+Substance = Callable[[Place], Look]
+"""A substance is a function of the place: small, readable, beside its kin in `looks/`."""
+
+
+STEPS = 256
+
+
+@cache
+def _ramp(stops: tuple[str, ...]) -> Array:
+    """(3, STEPS) linear colours between sRGB hex colours, evenly spaced, mixed in OKLab."""
+    linear = srgb_decode(np.array([[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in stops])).T  # (3, N)
+    lab = to_oklab(linear)
+    at, known = np.linspace(0, 1, STEPS), np.linspace(0, 1, len(stops))
+    return from_oklab(np.stack([np.interp(at, known, axis) for axis in lab])).astype(np.float32)
+
+
+def palette(t: Array, *stops: str) -> Array:
+    """Colours along evenly spaced sRGB hex stops. Args: t (P,), clamped to 0 … 1. Returns: (3, P) linear."""
+    ramp = _ramp(stops if len(stops) > 1 else stops * 2)
+    x = np.clip(t, 0, 1) * np.float32(STEPS - 1.001)
+    low = x.astype(np.int32)
+    return ramp[:, low] + (ramp[:, low + 1] - ramp[:, low]) * (x - low)
+
+
+def mix(a: Array, b: Array, t: Array) -> Array:
+    """From a at t = 0 to b at 1. Args: (3, P) or (P,) or numbers; t (P,)."""
+    return a + (b - a) * t
+
+
+def shade(color: Array, amount: Array) -> Array:
+    """Lighter (amount > 0) or darker, in natural logarithms of the luminance. Args: color (3, P); amount (P,)."""
+    return color * np.exp(np.clip(amount, -3, 1.5))
+
+
+WARM = np.array([[0.45], [0.0], [-0.75]], np.float32)
+GREEN = np.array([[-0.45], [0.3], [-0.3]], np.float32)
+
+
+def tint(color: Array, warm: Array, green: Array | float = 0.0) -> Array:
+    """Hue shifted along warm–cold and green–magenta at about the same luminance; 0.05 is just seen. Args: (3, P); (P,)."""
+    return color * np.exp(WARM * warm + GREEN * green)
+
+
+TO_LMS = np.array([[0.4122214708, 0.5363325363, 0.0514459929], [0.2119034982, 0.6806995451, 0.1073969566],
+                   [0.0883024619, 0.2817188376, 0.6299787005]])  # fmt: skip
+TO_LAB = np.array([[0.2104542553, 0.7936177850, -0.0040720468], [1.9779984951, -2.4285922050, 0.4505937099],
+                   [0.0259040371, 0.7827717662, -0.8086757660]])  # fmt: skip
+
+
+def to_oklab(linear: NDArray) -> NDArray:
+    """Linear Rec. 709 to OKLab. Args: (3, P). Returns: (3, P). Source: Ottosson 2020, "A perceptual color space"."""
+    return TO_LAB @ np.cbrt(TO_LMS @ linear)
+
+
+def from_oklab(lab: NDArray) -> NDArray:
+    """OKLab to linear Rec. 709, clamped to 0 … 1. Args: (3, P). Returns: (3, P)."""
+    return np.clip(np.linalg.solve(TO_LMS, np.linalg.solve(TO_LAB, lab) ** 3), 0, 1)

@@ -1,0 +1,333 @@
+"""What substances are made of: noise with a spectrum, cells, spots, strokes, tiles and threads.
+
+Every pattern is a function of a `Place` and holds nothing finer than its footprint: octaves fade out as they reach it, edges are
+averaged over it, and what faded from below a threshold is put back as a softer edge (`threshold`). Lengths are metres. Where the
+place repeats, lengths are rounded so that a whole number of them fits its period.
+"""
+
+import math
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.material import noise_kernels as kernels
+from stages.material.noise_kernels import Period, Strokes
+from stages.material.place import Axes, Place
+
+Array = NDArray[np.float32]
+
+SQUARE: Axes = (1.0, 1.0, 1.0)
+
+
+class Spectrum(NamedTuple):
+    """How noise is made up, octave by octave.
+
+    size: wavelength of its widest octave, metres. finest: of its narrowest. rise: deviation of an octave, times that of the next
+    wider one: 1 is as much contrast at every scale, as real materials have, 0.5 is smooth. stretch: lengths along the axes, as
+    multiples. tails: 0 a normal distribution; 0.5 rare strong grains. skew: 0.3 grains are light on dark, −0.3 dark on light.
+    patch: how much finer octaves' strength varies from place to place, 0.4 in most materials.
+    """
+
+    size: float
+    finest: float
+    rise: float = 1.0
+    stretch: Axes = SQUARE
+    tails: float = 0.0
+    skew: float = 0.0
+    patch: float = 0.0
+
+    @property
+    def octaves(self) -> int:
+        return max(1, 1 + math.floor(math.log2(max(self.size / self.finest, 1.0)) + 0.01))
+
+    def strengths(self) -> list[float]:
+        """Deviation of each octave; of all together it is 1."""
+        raw = [self.rise**k for k in range(self.octaves)]
+        total = math.sqrt(sum(a * a for a in raw))
+        return [a / total for a in raw]
+
+
+def seed_of(at: Place, number: int) -> np.uint32:
+    """A 32-bit seed of a place and a number of the caller's choice."""
+    return np.uint32((at.seed * 0x9E3779B1 + number * 0x85EBCA77 + 0x165667B1) & 0xFFFFFFFF)
+
+
+def fading(wavelength: float, footprint: Array) -> Array:
+    """How much of an octave is left at a footprint: all at half its wavelength, nothing at the whole of it."""
+    return np.clip(np.log2(np.float32(wavelength) / footprint), 0, 1)
+
+
+def _lattice(at: Place, wavelength: float, stretch: Axes) -> tuple[Axes, Period]:
+    """Cells a metre along each axis, and the period in cells, for a lattice of about this wavelength."""
+    wanted = [wavelength * s for s in stretch]
+    counts = [max(1, round(t / w)) if t else 0 for t, w in zip(at.period, wanted, strict=True)]
+    scale = [n / t if n else 1 / w for n, t, w in zip(counts, at.period, wanted, strict=True)]
+    return (scale[0], scale[1], scale[2]), Period(*map(float, counts))
+
+
+def noise(at: Place, size: float, seed: int = 0, stretch: Axes = SQUARE) -> Array:
+    """One octave of gradient noise, mean 0, deviation 1 where the footprint lets it be seen. Returns: (P,)."""
+    out = np.empty(len(at), np.float32)
+    scale, period = _lattice(at, size, stretch)
+    number = seed_of(at, seed)
+    shift = tuple(float(number >> s & 255) / 256 + 0.37 for s in (0, 8, 16))
+    x, y, z = at.p
+    kernels.gradient_noise(x, y, z, scale, shift, period, number, out)
+    return out * fading(size * min(stretch), at.footprint)
+
+
+def fbm(at: Place, spectrum: Spectrum, seed: int = 0) -> Array:
+    """Noise of a spectrum, mean 0, deviation 1 where all of it can be seen. Returns: (P,)."""
+    t, s = spectrum.tails, spectrum.skew
+    spread = math.sqrt(1 + 2 * t * 1.596 + 3 * t * t + 2 * s * s)
+    thinnest = float(at.footprint.min()) if len(at) else 1.0
+    total = np.zeros(len(at), np.float32)
+    envelope = np.exp(spectrum.patch * noise(at, 3 * spectrum.size, seed + 977, spectrum.stretch)) if spectrum.patch else None
+    for k, strength in enumerate(spectrum.strengths()):
+        size = spectrum.size / 2**k
+        if size * min(spectrum.stretch) <= thinnest:
+            break
+        octave = noise(at, size, seed * 31 + k, spectrum.stretch)
+        if t or s:
+            octave = (octave * (1 + t * abs(octave)) + s * (octave * octave - fading(size, at.footprint) ** 2)) / spread
+        if envelope is not None and k >= 1:
+            octave = octave * envelope
+        total += np.float32(strength) * octave
+    return total
+
+
+def lost(at: Place, spectrum: Spectrum) -> Array:
+    """Deviation of what the footprint hides of `fbm`'s noise. Returns: (P,)."""
+    variance = np.zeros(len(at), np.float32)
+    for k, strength in enumerate(spectrum.strengths()):
+        seen = fading(spectrum.size / 2**k * min(spectrum.stretch), at.footprint)
+        variance += np.float32(strength**2) * (1 - seen * seen)
+    return np.sqrt(variance)
+
+
+def threshold(x: Array, level: Array | float, softness: Array | float) -> Array:
+    """Share of x above a level: 0 to 1 over `softness` on either side. Add `lost` to the softness of noise. Returns: (P,)."""
+    t = np.clip((x - level) / (2 * np.maximum(softness, 1e-4)) + 0.5, 0, 1)
+    return (t * t * (3 - 2 * t)).astype(np.float32)
+
+
+def masked(at: Place, spectrum: Spectrum, share: float, seed: int = 0, softness: float = 0.05) -> Array:
+    """A mask with noisy borders that covers a share of everything; the share stays where the footprint hides the noise."""
+    level = NormalDist().inv_cdf(1 - min(max(share, 1e-4), 1 - 1e-4))
+    return threshold(fbm(at, spectrum, seed), level, softness + 1.2 * lost(at, spectrum))
+
+
+def edge(distance: Array, footprint: Array) -> Array:
+    """Share of the footprint that lies at a positive distance from a border. Returns: (P,)."""
+    return np.clip(distance / footprint + np.float32(0.5), 0, 1)
+
+
+def line(distance: Array, half_width: Array | float, footprint: Array) -> Array:
+    """Share of the footprint that a line covers whose middle is at a distance. Returns: (P,)."""
+    away = abs(distance)
+    return edge(half_width - away, footprint) - edge(-half_width - away, footprint)
+
+
+def warped(at: Place, amount: float, size: float, seed: int = 0, octaves: int = 2) -> Place:
+    """The place with its points displaced by noise. amount: deviation, metres. size: wavelength of the displacement."""
+    spectrum = Spectrum(size, size / 2 ** (octaves - 1), 0.5)
+    offset = np.stack([fbm(at, spectrum, seed * 3 + axis) for axis in range(3)])
+    return at.moved(np.float32(amount) * offset)
+
+
+class Cells(NamedTuple):
+    """Cells around random points. near, second: (P,) distance to the nearest point and the next, metres. border: (P,) distance to
+    the cell's border, metres. ident: (P,) uint32 a hash of the cell. offset: (3, P) from its point, metres. size: metres.
+    """
+
+    near: Array
+    second: Array
+    border: Array
+    ident: NDArray[np.uint32]
+    offset: Array
+    size: float
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each cell, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def cells(at: Place, size: float, seed: int = 0, jitter: float = 1.0, stretch: Axes = SQUARE) -> Cells:
+    """Worley cells of about this size. jitter: 0 a grid, 1 fully random. stretch: their lengths along the axes, as multiples.
+
+    Cells smaller than the footprint must be faded by the caller, with `fading(size, at.footprint)`.
+    """
+    scale, period = _lattice(at, size, stretch)
+    x, y, z = (np.ascontiguousarray(axis * np.float32(s)) for axis, s in zip(at.p, scale, strict=True))
+    near, second, border = (np.empty(len(at), np.float32) for _ in range(3))
+    ident, offset = np.empty(len(at), np.uint32), np.empty((3, len(at)), np.float32)
+    kernels.worley(x, y, z, period, jitter, seed_of(at, seed), near, second, border, ident, offset)
+    unit = np.float32(size)
+    return Cells(near * unit, second * unit, border * unit, ident, offset * unit, size)
+
+
+class Spots(NamedTuple):
+    """Separate spots. inside: (P,) distance to the spot's rim, metres, positive within. cover: (P,) share of the footprint.
+    radius: (P,) of the nearest spot, metres. cells: of which each holds at most one.
+    """
+
+    inside: Array
+    cover: Array
+    radius: Array
+    cells: Cells
+
+
+def spots(
+    at: Place, size: float, radius: tuple[float, float], share: float = 1.0, seed: int = 0, stretch: Axes = SQUARE
+) -> Spots:
+    """Round spots strewn without overlap. size: mean distance between them. radius: least and largest, metres. share: of cells
+    that hold one. Warp the place first for ragged ones."""
+    found = cells(at, size, seed, 0.8, stretch)
+    low, high = radius
+    mine = np.float32(low) + np.float32(high - low) * found.random(1) ** 2
+    inside = np.where(found.random(2) < share, mine - found.near, np.float32(-1))
+    return Spots(inside, edge(inside, at.footprint), mine, found)
+
+
+class Marks(NamedTuple):
+    """Strokes: scratches, fibres, blades, hairs. cover: (P,) share of the footprint. across: (P,) −1 … 1 over the width, 9 where
+    there is none. along: (P,) −1 … 1 from end to end. ident: (P,) uint32.
+    """
+
+    cover: Array
+    across: Array
+    along: Array
+    ident: NDArray[np.uint32]
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each stroke, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def marks(
+    at: Place, length: float, width: float, count: int, angle: float = 0.0, spread: float = 0.3, seed: int = 0,
+    vary: float = 0.7, bend: float = 0.0,
+) -> Marks:  # fmt: skip
+    """Strokes strewn over the surface (at.uv), the upper hiding the lower, thin towards their ends.
+
+    length, width: of the longest, metres. count: how many begin in a square of edge `length`, 1 to 16. angle: of their
+    direction, radians from the first axis of uv. spread: range of angles about it; 2π for any. bend: see `Strokes`.
+    """
+    flat = at.flat
+    scale, period = _lattice(flat, length, SQUARE)
+    x, y = (np.ascontiguousarray(axis * np.float32(s)) for axis, s in zip(at.uv, scale, strict=False))
+    half = max(width, 1e-7) / 2 / length
+    reach = half + float(at.footprint.max(initial=0)) / length  # a thin stroke is seen a footprint away
+    shape = Strokes(count, 0.5, vary, min(reach, 0.45), angle, spread, bend)
+    distance, along = np.empty(len(at), np.float32), np.empty(len(at), np.float32)
+    ident = np.empty(len(at), np.uint32)
+    kernels.strokes(x, y, at.face, period, shape, seed_of(at, seed), distance, along, ident)
+    here = distance < 8
+    own = np.float32(width / 2) * np.sqrt(np.clip(1 - along * along, 0, 1))
+    cover = np.where(here, line(distance * np.float32(length), own, at.footprint), 0)
+    across = np.where(here, distance * np.float32(2 * length / width), 9)
+    return Marks(cover.astype(np.float32), across.astype(np.float32), along, ident)
+
+
+class Tiles(NamedTuple):
+    """Tiles of a bond. ident: (P,) uint32. x, y: (P,) from the tile's middle, metres. width, height: of a tile, metres. border: (P,)
+    distance to the tile's rim, metres, positive inside. turned: (P,) whether the tile stands across.
+    """
+
+    ident: NDArray[np.uint32]
+    x: Array
+    y: Array
+    width: float
+    height: float
+    border: Array
+    turned: NDArray[np.bool_]
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each tile, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def tiles(at: Place, width: float, height: float, bond: str = "running", seed: int = 0) -> Tiles:
+    """Rectangular tiles on the surface (at.uv). bond: "running" (half offset), "third", "random", "stack"."""
+    (columns, across), (rows, up) = (_fitted(t, s, m) for t, s, m in zip(at.period[:2], (width, height), (1, 2), strict=True))
+    u, v = at.uv[0] / np.float32(across), at.uv[1] / np.float32(up)
+    row = np.floor(v)
+    wrapped_row = row - rows * np.floor(row / rows) if rows else row
+    number = seed_of(at, seed)
+    lane = kernels.random_numbers(_hash(wrapped_row, at.face, number), 1)
+    offset = {"running": 0.5 * (wrapped_row % 2), "third": wrapped_row % 3 / 3, "random": lane, "stack": 0 * u}[bond]
+    u = u + offset.astype(np.float32)
+    column = np.floor(u)
+    wrapped_column = column - columns * np.floor(column / columns) if columns else column
+    ident = _hash(wrapped_column + np.float32(7919) * wrapped_row, at.face, number)
+    x, y = (u - column - np.float32(0.5)) * np.float32(across), (v - row - np.float32(0.5)) * np.float32(up)
+    border = np.minimum(np.float32(across / 2) - abs(x), np.float32(up / 2) - abs(y))
+    return Tiles(ident, x, y, across, up, border, np.zeros(len(at), bool))
+
+
+def _fitted(period: float, size: float, multiple: int) -> tuple[int, float]:
+    """How many of a size fit a period, a multiple of `multiple`, and their exact size; 0 and the size without a period."""
+    if not period:
+        return 0, size
+    count = max(multiple, multiple * round(period / size / multiple))
+    return count, period / count
+
+
+def _hash(value: Array, face: NDArray[np.int32], seed: np.uint32) -> NDArray[np.uint32]:
+    """A hash of whole numbers. Args: (P,) each."""
+    h = np.rint(value).astype(np.int64).astype(np.uint32) * np.uint32(0x8DA6B343)
+    return h ^ face.astype(np.uint32) * np.uint32(0xD8163841) ^ seed
+
+
+class Weave(NamedTuple):
+    """Threads over and under. height: (P,) 0 … 1 of the topmost thread's round back. warp: (P,) 1 where a warp thread (up) lies on top,
+    0 where a weft thread does. across: (P,) −1 … 1 over that thread. gap: (P,) 1 where no thread is. ident: (P,) uint32 of the
+    thread. seen: (P,) how much of single threads the footprint still shows.
+    """
+
+    height: Array
+    warp: Array
+    across: Array
+    gap: Array
+    ident: NDArray[np.uint32]
+    seen: Array
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each thread, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+DRAFTS = {"plain": ((1, 0), (0, 1)), "twill": ((1, 1, 0), (0, 1, 1), (1, 0, 1)), "satin": (
+    (0, 1, 1, 1, 1), (1, 1, 0, 1, 1), (1, 1, 1, 1, 0), (1, 0, 1, 1, 1), (1, 1, 1, 0, 1)), "basket": (
+    (1, 1, 0, 0), (1, 1, 0, 0), (0, 0, 1, 1), (0, 0, 1, 1))}  # fmt: skip
+"""Row by row, whether the warp thread lies on top."""
+
+
+def weave(at: Place, pitch: float, draft: str = "plain", fill: float = 0.92, seed: int = 0) -> Weave:
+    """Woven threads on the surface (at.uv). pitch: distance between threads, metres. fill: width of a thread, of the pitch."""
+    table = np.array(DRAFTS[draft], bool)
+    n = len(table)
+    (columns, across), (rows, up) = (_fitted(t, pitch, n) for t in at.period[:2])
+    u, v = at.uv[0] / np.float32(across), at.uv[1] / np.float32(up)
+    i, j = np.floor(u), np.floor(v)
+    fu, fv = 2 * (u - i) - 1, 2 * (v - j) - 1  # −1 … 1 over each thread
+    warp_on_top = table[j.astype(np.int64) % n, i.astype(np.int64) % n]
+    over = np.where(warp_on_top, fu, fv) / np.float32(fill)
+    along = np.where(warp_on_top, fv, fu)
+    other = np.where(warp_on_top, fv, fu) / np.float32(fill)
+    round_back = np.sqrt(np.clip(1 - over * over, 0, 1))
+    beneath = 0.55 * np.sqrt(np.clip(1 - other * other, 0, 1))
+    on = abs(over) < 1
+    height = np.where(on, 0.35 + 0.65 * round_back * (1 - 0.35 * along * along), beneath)
+    gap = (~on & (abs(other) >= 1)).astype(np.float32)
+    shown_warp = np.where(on, warp_on_top, ~warp_on_top)
+    i, j = (k - c * np.floor(k / c) if c else k for k, c in ((i, columns), (j, rows)))
+    thread = np.where(shown_warp, i, j + 4_000_037)
+    seen = np.clip(np.log2(np.float32(pitch) / at.footprint) - 0.5, 0, 1)
+    across_it = np.where(on, over, other)
+    return Weave(
+        height.astype(np.float32), shown_warp.astype(np.float32), across_it.astype(np.float32), gap,
+        _hash(thread, at.face, seed_of(at, seed)), seen.astype(np.float32),
+    )  # fmt: skip

@@ -1,0 +1,49 @@
+"""Where a material is asked for: points of a real thing, in metres, and how far apart they are."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Axes = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Place:
+    """Points at which a pattern is evaluated.
+
+    p: (3, P) position in the pattern's own frame, metres; its third axis is up where up matters. uv: (2, P) metres along the
+    surface, across and up; see `directions.py`. face: (P,) which of the surface's sides uv belongs to. footprint: (P,) edge of the
+    texel or pixel that a point stands for, metres: nothing finer is held. period: metres after which everything repeats, by axis;
+    0 never. seed: of this substance on this thing.
+    """
+
+    p: NDArray[np.float32]
+    uv: NDArray[np.float32]
+    face: NDArray[np.int32]
+    footprint: NDArray[np.float32]
+    period: Axes = (0.0, 0.0, 0.0)
+    seed: int = 0
+
+    def __len__(self) -> int:
+        return self.p.shape[1]
+
+    @property
+    def flat(self) -> "Place":
+        """The same with the position along the surface in place of that in space: patterns of two dimensions."""
+        p = np.concatenate([self.uv, self.face[None] * np.float32(17.31)])
+        return replace(self, p=p, period=(self.period[0], self.period[1], 0.0))
+
+    def moved(self, offset: NDArray[np.float32]) -> "Place":
+        """The same points displaced. Args: offset (3, P) metres, itself of this place's period."""
+        return replace(self, p=self.p + offset)
+
+    def swapped(self) -> "Place":
+        """The first two axes exchanged."""
+        period = (self.period[1], self.period[0], self.period[2])
+        order = [1, 0, 2]
+        return replace(self, p=self.p[order], uv=self.uv[::-1], period=period)
+
+    def seeded(self, number: int) -> "Place":
+        """The same place for another draw of every pattern."""
+        return replace(self, seed=self.seed * 1_000_003 + number)
