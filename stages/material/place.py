@@ -28,6 +28,10 @@ class Place:
     def __len__(self) -> int:
         return self.p.shape[1]
 
+    def __getitem__(self, rows: NDArray | slice) -> "Place":
+        p, uv = self.p[:, rows], self.uv[:, rows]
+        return replace(self, p=p, uv=uv, face=self.face[rows], footprint=self.footprint[rows])
+
     @property
     def flat(self) -> "Place":
         """The same with the position along the surface in place of that in space: patterns of two dimensions."""

@@ -28,3 +28,7 @@ def brick(at: Place) -> Look:
     color = mix(mix(mortar, clay, face), palette(sand, "#c9c2b8"), bloom)
     height = face * (0.0035 + 0.0008 * (bond.random(5) - 0.5) + 1.6e-4 * grit - 0.001 * pits) + (1 - face) * 2e-4 * sand
     return Look(color, 0.86 + 0.05 * sand * (1 - face) - 0.06 * face + 0.04 * grit * face, 0.0, height - 0.003, face)
+
+
+LOOKS = {"brick": brick}
+METRES = {"brick": 1.8}

@@ -22,3 +22,7 @@ def rust(at: Place) -> Look:
     color = tint(shade(color, 0.24 * grit + 0.1 * age - 0.5 * pits), 0.12 * noise(bent, 0.02, 8))
     roughness = 0.86 + 0.05 * grit + 0.06 * bloom - 0.12 * dark
     return Look(color, np.clip(roughness, 0.3, 1), 0.0, 1.2e-4 * grit + 3e-4 * bloom - 2.5e-4 * dark - 4e-4 * pits)
+
+
+LOOKS = {"rust": rust}
+METRES = {"rust": 0.5}

@@ -40,3 +40,7 @@ def marble(at: Place) -> Look:
     color = palette(depth, "#e9e7e3", "#d3d1cd", "#9b9a98", "#63615f")
     color = tint(shade(color, 0.035 * grain - 0.03 * abs(cloud)), 0.05 * noise(bent, 0.1, 9))
     return Look(color, 0.16 + 0.12 * np.clip(depth, 0, 1) + 0.02 * grain, 0.0, 6e-6 * grain - 3e-5 * hair)
+
+
+LOOKS = {"granite": granite, "marble": marble}
+METRES = {"granite": 0.5, "marble": 1.2}

@@ -1,0 +1,141 @@
+"""The material that a recipe gives to points of a surface: the one function that bake, distill, previews and swatches share."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from stages.core.color import srgb_decode
+from stages.material.directions import FIRST_ROUND, WHOLE, Pieces, along
+from stages.material.look import Look, from_oklab, to_oklab
+from stages.material.masks import coverage
+from stages.material.place import Place
+from stages.material.recipe import Coat, Recipe
+from stages.material.substances import ALONG_GRAIN, LOOKS, METRES
+from stages.material.surface import Array, Surface
+
+COLUMNS = 6
+"""Red, green and blue of the linear albedo, roughness, metallic, height in object sizes."""
+
+SAMPLES = 96
+"""Edge of the square of samples from which a look's means are told."""
+
+
+def evaluate(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Array:
+    """Material of points: (P, 6), see `COLUMNS`. The recipe is settled (`masks.settled`)."""
+    result = np.empty((len(surface), COLUMNS), np.float32)
+    uv, face = along(pieces, surface.piece, surface.point, surface.normal)
+    for rows, around in _groups(face, pieces):
+        part = surface[rows]
+        world = Place(np.ascontiguousarray(part.point.T), uv[:, rows], face[rows], part.footprint, (around, 0, 0), recipe.seed)
+        result[rows] = layered(recipe, part, world, pieces)
+    return result
+
+
+def _groups(face, pieces: Pieces):  # type: ignore[no-untyped-def]
+    """Points that share a period: those of each round piece's wall, and all others. Yields (rows, way around)."""
+    kind, piece = face % 16, face // 16
+    for k in np.flatnonzero(pieces.radius > 0):
+        rows = np.flatnonzero((kind == FIRST_ROUND) & (piece == k))
+        if len(rows):
+            yield rows, float(2 * np.pi * pieces.radius[k])
+    rows = np.flatnonzero(kind != FIRST_ROUND)
+    if len(rows):
+        yield rows, 0.0
+
+
+def layered(recipe: Recipe, surface: Surface, world: Place, pieces: Pieces = WHOLE) -> Array:
+    """As `evaluate`, of points that share a period. Args: world: the same points in object sizes."""
+    values = coated(recipe.base, surface, world, pieces, 0)
+    for number, layer in enumerate(recipe.layers, 1):
+        cover = coverage(layer.masks, surface, world.seeded(number)) * np.float32(layer.strength)
+        some = np.flatnonzero(cover > 0)
+        if len(some):
+            over = coated(layer.coat, surface[some], world[some], pieces, number)
+            over[:, 5] += 0.5 * values[some, 5] + layer.thickness / layer.coat.metres
+            values[some] += (over - values[some]) * cover[some, None]
+    return values
+
+
+def coated(coat: Coat, surface: Surface, world: Place, pieces: Pieces, number: int) -> Array:
+    """One coat at points: (P, 6). Args: number: of the coat in its recipe, which seeds it."""
+    metres = np.float32(coat.metres)
+    place = Place(
+        _solid(coat, surface, world, pieces, number) * metres, world.uv * metres, world.face, world.footprint * metres,
+        (world.period[0] * coat.metres, world.period[1] * coat.metres, 0.0), world.seed * 31 + number,
+    )  # fmt: skip
+    found = turned(LOOKS[coat.look](place), coat)
+    columns = [*found.color, found.roughness, found.metallic, found.height / metres * np.float32(coat.relief)]
+    return np.stack([np.broadcast_to(c, len(world)) for c in columns], 1).astype(np.float32)
+
+
+def _solid(coat: Coat, surface: Surface, world: Place, pieces: Pieces, number: int) -> Array:
+    """Positions in the coat's own frame, (3, P) object sizes: turned and shifted by chance; wood is sawn along each piece."""
+    dice = np.random.default_rng([world.seed, number])
+    shift = dice.uniform(0, 4, (3, 1)).astype(np.float32)
+    if world.period[1]:  # a square that tiles lies as it is
+        return world.p + shift
+    if coat.look not in ALONG_GRAIN:
+        angle = dice.uniform(0, 2 * np.pi)
+        c, s = np.cos(angle), np.sin(angle)
+        turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]], np.float32)
+        return turn @ surface.point.T + shift
+    frames = np.stack([_grain_frame(axis) for axis in pieces.grain])  # (K, 3, 3)
+    own = dice.uniform(0, 0.3, (len(frames), 3)).astype(np.float32)[surface.piece]  # every piece is cut elsewhere
+    local = np.einsum("pij,pj->pi", frames[surface.piece], surface.point - pieces.centre[surface.piece])
+    return (local + own).T.astype(np.float32)
+
+
+def _grain_frame(grain: Array) -> Array:
+    """A rotation whose second axis is the grain's. Args: (3,) unit. Returns: (3, 3)."""
+    other = np.array([0, 0, 1]) if abs(grain[2]) < 0.9 else np.array([1, 0, 0])
+    first = np.cross(grain, other)
+    first /= np.linalg.norm(first)
+    return np.stack([first, grain, np.cross(first, grain)]).astype(np.float32)
+
+
+class Means(NamedTuple):
+    """Of a look: OKLab of its dyed share, (3,); roughness; metallic."""
+
+    lab: Array
+    roughness: float
+    metallic: float
+
+
+@cache
+def means(look: str) -> Means:
+    """A look's means over a square of the size at which it is legible."""
+    across = (np.arange(SAMPLES, dtype=np.float32) + 0.5) * np.float32(METRES[look] / SAMPLES)
+    u, v = (a.ravel() for a in np.meshgrid(across, across))
+    step = np.full(len(u), METRES[look] / 512, np.float32)
+    found = LOOKS[look](Place(np.stack([u, v, 0 * u]), np.stack([u, v]), np.zeros(len(u), np.int32), step))
+    dye = np.broadcast_to(np.asarray(found.dye, np.float64), len(u)) + 1e-6
+    color = (found.color * dye).sum(1) / dye.sum()
+    lab = to_oklab(color[:, None])[:, 0]
+    return Means(lab.astype(np.float32), float(np.mean(found.roughness)), float(np.mean(found.metallic)))
+
+
+def turned(found: Look, coat: Coat) -> Look:
+    """A look with its dyed share's colours, its roughness and metallic moved to the means that the coat asks for."""
+    mean = means(coat.look)
+    color, roughness, metallic = found.color, found.roughness, found.metallic
+    if coat.color is not None or coat.contrast != 1:
+        color = color + (recolored(color, mean.lab, coat) - color) * found.dye
+    if coat.roughness is not None:
+        spread = min(1.0, coat.roughness / max(mean.roughness, 1e-3), (1 - coat.roughness) / max(1 - mean.roughness, 1e-3) + 0.3)
+        roughness = coat.roughness + (roughness - mean.roughness) * np.float32(spread)
+    if coat.metallic is not None:
+        metallic = metallic + np.float32(coat.metallic - mean.metallic)
+    clipped = (np.clip(a, 0, 1) for a in (color, roughness, metallic))
+    return Look(*clipped, found.height, found.dye)
+
+
+def recolored(color: Array, mean: Array, coat: Coat) -> Array:
+    """Colours about another mean, at the same contrast. Args: color (3, P) linear; mean (3,) OKLab. Returns: (3, P)."""
+    wanted = mean
+    if coat.color is not None:
+        wanted = to_oklab(srgb_decode(np.array(coat.color, np.float64))[:, None])[:, 0].astype(np.float32)
+    lab = to_oklab(np.maximum(color, 1e-5)).astype(np.float32)
+    lightness = wanted[0] * (1 + coat.contrast * (lab[0] / mean[0] - 1))
+    gain = np.float32(coat.contrast * min(1.0, max(wanted[0] / mean[0], 0.3)))
+    return from_oklab(np.stack([np.clip(lightness, 0.02, 1), *(wanted[k] + gain * (lab[k] - mean[k]) for k in (1, 2))]))

@@ -1,0 +1,105 @@
+"""Where a layer lies: by height and direction, on edges and in crevices, in spots, stripes and patches.
+
+A mask is a field over the surface and a level: it covers what lies above the level. Fields that are distances (height, stripes,
+spots) have borders as sharp as a texel; the others are roughened by noise at every scale, as wear does, so that no border is a blur.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from stages.material.patterns import Spectrum, edge, fbm, lost, noise, spots, threshold, warped
+from stages.material.place import Place
+from stages.material.recipe import Layer, Mask, Recipe
+from stages.material.surface import Array, Surface
+
+DISTANCES = ("below", "above", "front", "back", "stripes", "bands", "spots", "checks")
+"""Kinds whose field is a distance from the border, object sizes."""
+
+CHANCE = ("patches", "streaks", "scratches", "chips")
+"""Kinds whose field is noise of deviation 1."""
+
+
+def coverage(masks: tuple[Mask, ...], surface: Surface, world: Place) -> Array:
+    """Share of each point's footprint where all masks hold, (P,). Args: world: the same points in object sizes."""
+    result = np.ones(len(surface), np.float32)
+    for number, mask in enumerate(masks):
+        if mask.kind != "all":
+            own = _cover(mask, surface, world.seeded(101 + number))
+            result *= 1 - own if mask.invert else own
+    return result
+
+
+def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
+    level = np.float32(0.0 if mask.level is None else mask.level)
+    value = signal(mask, surface, at)
+    if mask.kind in DISTANCES:
+        rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.75)
+        ragged = 0.12 * mask.wear * mask.size
+        if mask.wear:
+            value = value + ragged * fbm(at, rough, 5)
+        soft = np.maximum(0.5 * at.footprint, 1.2 * ragged * lost(at, rough)) if mask.wear else 0.5 * at.footprint
+        return edge(value - level, 2 * soft)
+    if mask.kind in CHANCE:
+        return threshold(value, level, 0.06 + 1.2 * lost(at, _chance(mask)))
+    rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.9, patch=0.4)
+    amount = 0.04 + 0.16 * mask.wear
+    return threshold(value + amount * fbm(at, rough, 5), level, 0.02 + 1.2 * amount * lost(at, rough))
+
+
+def _chance(mask: Mask) -> Spectrum:
+    stretch = {"streaks": (0.12, 0.12, 1.0), "scratches": (1.0, 0.02, 0.02)}.get(mask.kind, (1.0, 1.0, 1.0))
+    rise = 0.55 + 0.35 * mask.wear
+    return Spectrum(mask.size, max(mask.size / 128, 2e-4), rise, stretch, patch=0.4 * mask.wear)
+
+
+def signal(mask: Mask, surface: Surface, at: Place) -> Array:
+    """The field of a mask, (P,): larger where the layer lies."""
+    x, y, z = at.p
+    if mask.kind in ("below", "above", "front", "back"):
+        return {"below": -z, "above": z, "front": x, "back": -x}[mask.kind]
+    if mask.kind in ("edges", "crevices"):
+        return surface.convexity if mask.kind == "edges" else np.maximum(-surface.convexity, 0.8 * surface.occlusion - 0.2)
+    if mask.kind in ("up", "down"):
+        return surface.normal[:, 2] if mask.kind == "up" else -surface.normal[:, 2]
+    if mask.kind == "hidden":
+        return surface.occlusion
+    if mask.kind in ("stripes", "bands"):
+        phase = (z if mask.kind == "bands" else (x + y) * np.float32(0.7071)) / np.float32(mask.size)
+        wave = phase - np.floor(phase)
+        return np.float32(mask.size) * (np.float32(0.5) - abs(wave - np.float32(0.5)))
+    if mask.kind == "checks":
+        u, v = at.flat.p[:2] / np.float32(mask.size)
+        away = np.minimum(abs(u - np.rint(u)), abs(v - np.rint(v))) * np.float32(mask.size)
+        return np.where((np.floor(u) + np.floor(v)) % 2 == 0, away, -away).astype(np.float32)
+    if mask.kind == "spots":
+        bent = warped(at, 0.05 * mask.size * (0.3 + mask.wear), 0.5 * mask.size, 3)
+        return spots(bent, mask.size, (0.22 * mask.size, 0.42 * mask.size), 1.0, 4).inside
+    if mask.kind == "chips":
+        strength = 0.8 * noise(at, 3 * mask.size, 9) + 1.4 * np.clip(surface.convexity, -0.3, 0.6)
+        return fbm(at, _chance(mask), 7) + strength
+    bent = warped(at, 0.3 * mask.size, mask.size, 3) if mask.kind == "patches" else at
+    return fbm(bent, _chance(mask), 7)
+
+
+def settled(recipe: Recipe, surface: Surface, world: Place) -> Recipe:
+    """The recipe with each mask's level set so that it covers its share of this surface.
+
+    Args:
+        surface: points spread evenly over all of it. world: the same points in object sizes.
+    """
+
+    def settle(mask: Mask, number: int) -> Mask:
+        if mask.kind == "all" or mask.level is not None:
+            return mask
+        value = signal(mask, surface, world.seeded(101 + number))
+        share = 1 - mask.share if mask.invert else mask.share
+        if mask.kind in ("below", "above", "front", "back"):  # a share of the extent, not of the area
+            low, high = float(value.min()), float(value.max())
+            return replace(mask, level=high - share * (high - low))
+        return replace(mask, level=float(np.quantile(value, 1 - np.clip(share, 0, 1))))
+
+    def layer(old: Layer, place: int) -> Layer:
+        return replace(old, masks=tuple(settle(mask, number) for number, mask in enumerate(old.masks)))
+
+    return replace(recipe, layers=tuple(layer(old, k) for k, old in enumerate(recipe.layers)))

@@ -1,0 +1,92 @@
+"""What a thing is made of, as a procedure: a base and layers over it, each a substance and a mask that says where it lies.
+
+A recipe is plain data, so that it can be printed, stored in material.npz and edited. It has no resolution and knows no mesh. What
+follows a mesh (the lowest tenth, a fifth of the edges) is settled by `masks.settled` once the surface is known.
+"""
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+KINDS = (
+    "all", "below", "above", "front", "back", "edges", "crevices", "up", "down", "hidden",
+    "spots", "stripes", "bands", "checks", "patches", "streaks", "scratches", "chips",
+)  # fmt: skip
+"""Ways to say where a layer lies; see `masks.py`."""
+
+
+@dataclass(frozen=True)
+class Coat:
+    """A substance as a recipe has it.
+
+    look: its name in `substances.LOOKS`. color: sRGB mean that its dyed share is turned to, or None for its own. roughness,
+    metallic: means that it is turned to, or None. contrast: of its colours about their mean. metres: how long the object's longest
+    edge counts, for the size of its structure. relief: of its heights.
+    """
+
+    look: str
+    color: tuple[float, float, float] | None = None
+    roughness: float | None = None
+    metallic: float | None = None
+    contrast: float = 1.0
+    metres: float = 1.0
+    relief: float = 1.0
+    said: str = ""
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the height for "below" and "above". size: of its shapes or
+    of its border's noise, as a share of the object. wear: 0 a border as sharp as paint … 1 a ragged one. invert: everywhere else.
+    level: threshold of what the mask is made of, once settled; None before.
+    """
+
+    kind: str = "all"
+    share: float = 0.3
+    size: float = 0.08
+    wear: float = 0.5
+    invert: bool = False
+    level: float | None = None
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A coat over what is beneath. masks: it lies where all of them say so. thickness: metres, negative where it is sunk.
+    strength: most that it covers, 1 for what hides all beneath it.
+    """
+
+    coat: Coat
+    masks: tuple[Mask, ...] = (Mask(),)
+    thickness: float = 0.0
+    strength: float = 1.0
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Base and layers, from below. seed: of everything left to chance; it changes patterns, not stuff."""
+
+    base: Coat
+    layers: tuple[Layer, ...] = field(default=())
+    seed: int = 0
+
+    def to_json(self) -> dict[str, Any]:
+        """As JSON types."""
+        return asdict(self)
+
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> "Recipe":
+        """Of what `to_json` gave. Raises: KeyError, TypeError where it is something else."""
+        layers = tuple(
+            Layer(_coat(raw["coat"]), tuple(Mask(**mask) for mask in raw["masks"]), raw["thickness"], raw["strength"])
+            for raw in data["layers"]
+        )
+        return Recipe(_coat(data["base"]), layers, data["seed"])
+
+    @property
+    def coats(self) -> tuple[Coat, ...]:
+        """The base's and each layer's."""
+        return (self.base, *(layer.coat for layer in self.layers))
+
+
+def _coat(data: dict[str, Any]) -> Coat:
+    color = data["color"]
+    return Coat(**{**data, "color": None if color is None else (color[0], color[1], color[2])})

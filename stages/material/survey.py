@@ -1,0 +1,201 @@
+"""What a material must know of a mesh: where its edges and creases are, what it hides from the sky, which pieces it has.
+
+A survey is some tens of thousands of points spread over the surface, more of them along sharp edges, each with what was found
+there. It is made once, from the mesh, and travels with the conditions and with material.npz, so that a point seen by a view and a
+texel of a bake are told the same.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from stages.material.directions import WHOLE, Pieces, measure
+from stages.material.surface import Array, Surface
+
+POINTS, EDGE_POINTS = 50_000, 30_000
+"""Points spread evenly, and those beside sharp edges."""
+
+SHARP = 0.85
+"""Neighbouring triangles whose normals agree by less than this cosine, 32 degrees, meet in an edge or a crease."""
+
+NEAR, REACH = 24, 0.03
+"""Neighbours that tell a point's convexity, and how far away they may be, object sizes."""
+
+RAYS = 48
+"""Rays a point that tell what hides the sky."""
+
+OFFSET = 1e-4
+"""How far above the surface a ray begins, object sizes."""
+
+MIXED = 3
+"""Points of the survey that a look-up mixes."""
+
+Blocked = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.bool_]]
+"""Whether rays meet the object. Args: origins, directions (R, 3). Returns: (R,)."""
+
+
+class Survey(NamedTuple):
+    """point, normal: (S, 3) world. convexity, occlusion: (S,). piece: (S,) int32, row of `pieces`. pieces: what hangs together."""
+
+    point: Array
+    normal: Array
+    convexity: Array
+    occlusion: Array
+    piece: NDArray[np.int32]
+    pieces: Pieces
+
+    def surface(self) -> Surface:
+        """The survey's own points as a surface."""
+        size = np.full(len(self.point), np.float32(1e-3))
+        return Surface(self.point, self.normal, size, self.convexity, self.occlusion, self.piece)
+
+    def to_arrays(self) -> dict[str, NDArray]:
+        """By name, as `from_arrays` wants them; half floats where they do."""
+        rows = {"point": self.point, "normal": self.normal, "convexity": self.convexity, "occlusion": self.occlusion}
+        arrays: dict[str, NDArray] = {f"survey_{name}": value.astype(np.float16) for name, value in rows.items()}
+        arrays |= {"survey_point": self.point, "survey_piece": self.piece}
+        return arrays | {f"pieces_{name}": value for name, value in self.pieces._asdict().items()}
+
+    @staticmethod
+    def from_arrays(arrays: dict[str, NDArray]) -> "Survey":
+        """Of what `to_arrays` gave."""
+        pieces = Pieces(*(arrays[f"pieces_{name}"] for name in Pieces._fields))
+        rows = (arrays[f"survey_{name}"].astype(np.float32) for name in ("point", "normal", "convexity", "occlusion"))
+        return Survey(*rows, arrays["survey_piece"], pieces)
+
+
+class Lookup:
+    """A survey that can be asked about any point of the surface."""
+
+    def __init__(self, survey: Survey) -> None:
+        self.survey = survey
+        self._tree = cKDTree(survey.point, balanced_tree=False, compact_nodes=False)
+
+    def surface(self, point: Array, normal: Array, footprint: Array) -> Surface:
+        """Points with what the survey knows there: the nearest of its points, those that face the same way first.
+
+        Args:
+            point, normal: (P, 3) world. footprint: (P,).
+        """
+        if not len(point):
+            return Surface.bare(point, normal, footprint)
+        distance, index = self._tree.query(point, MIXED)
+        agree = np.einsum("pkd,pd->pk", self.survey.normal[index], normal).clip(0.02, 1)
+        weight = agree**2 / np.maximum(distance, 1e-6)
+        weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
+        convexity, occlusion = ((weight * values[index]).sum(1) for values in (self.survey.convexity, self.survey.occlusion))
+        best = np.take_along_axis(index, weight.argmax(1)[:, None], 1)[:, 0]
+        return Surface(point, normal, footprint, convexity, occlusion, self.survey.piece[best])
+
+
+def make_survey(vertices: Array, triangles: NDArray[np.int32], normals: Array, blocked: Blocked, seed: int = 0) -> Survey:
+    """Survey a mesh.
+
+    Args:
+        vertices: (V, 3) world, welded. triangles: (F, 3). normals: (F, 3, 3) shading normal of each corner. blocked: traces rays.
+    """
+    rng = np.random.default_rng(seed)
+    corners = vertices[triangles].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.linalg.norm(cross, axis=1) / 2
+    face, weights = _everywhere(area, rng)
+    edge_face, edge_weights = _beside_edges(triangles, corners, cross, rng)
+    face, weights = np.concatenate([face, edge_face]), np.concatenate([weights, edge_weights])
+    point = np.einsum("pk,pkd->pd", weights, corners[face]).astype(np.float32)
+    normal = np.einsum("pk,pkd->pd", weights, normals[face])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = (normal / np.where(length > 0, length, 1)).astype(np.float32)
+    of_vertex = connected_pieces(triangles, len(vertices))
+    shares = np.where(np.arange(len(face)) < POINTS, area.sum() / POINTS, 0.0)
+    pieces, row = measure(point, normal, shares, of_vertex[triangles[face, 0]])
+    flat = (cross[face] / np.maximum(2 * area[face], 1e-30)[:, None]).astype(np.float32)
+    return Survey(point, normal, convexity(point, normal), occlusion(point, normal, flat, blocked, rng), row, pieces)
+
+
+def connected_pieces(triangles: NDArray[np.int32], count: int) -> NDArray[np.int64]:
+    """(V,) number of the piece that each vertex belongs to."""
+    a, b = triangles[:, [0, 1]].T.reshape(2, -1), triangles[:, [1, 2]].T.reshape(2, -1)
+    rows, columns = np.concatenate([a[0], b[0]]), np.concatenate([a[1], b[1]])
+    graph = coo_matrix((np.ones(len(rows), bool), (rows, columns)), (count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _everywhere(area: NDArray, rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray]:
+    """Triangles and barycentric weights of points spread evenly."""
+    total = np.cumsum(area)
+    u = (np.arange(POINTS) + rng.random(POINTS)) / POINTS * total[-1]
+    face = np.searchsorted(total, u, side="right").clip(max=len(area) - 1)
+    root, other = np.sqrt(rng.random(POINTS)), rng.random(POINTS)
+    return face, np.stack([1 - root, root * (1 - other), root * other], 1)
+
+
+def _beside_edges(
+    triangles: NDArray[np.int32], corners: NDArray, cross: NDArray, rng: np.random.Generator
+) -> tuple[NDArray[np.int64], NDArray]:
+    """The same of points close to sharp edges, on the triangles that meet there."""
+    start, end = triangles.T.reshape(-1), triangles[:, [1, 2, 0]].T.reshape(-1)  # side k of each triangle: corner k to k + 1
+    owner, side = np.tile(np.arange(len(triangles)), 3), np.repeat(np.arange(3), len(triangles))
+    key = np.minimum(start, end).astype(np.int64) * (int(triangles.max(initial=0)) + 1) + np.maximum(start, end)
+    order = np.argsort(key, kind="stable")
+    pairs = np.flatnonzero(key[order][1:] == key[order][:-1])
+    one, two = order[pairs], order[pairs + 1]
+    unit = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-30)
+    sharp = (unit[owner[one]] * unit[owner[two]]).sum(1) < SHARP
+    sides = np.concatenate([one[sharp], two[sharp]])
+    if not len(sides):
+        return np.zeros(0, np.int64), np.zeros((0, 3))
+    a, b = corners[owner[sides], side[sides]], corners[owner[sides], (side[sides] + 1) % 3]
+    length = np.cumsum(np.linalg.norm(b - a, axis=1))
+    pick = np.searchsorted(length, rng.random(EDGE_POINTS) * length[-1], side="right").clip(max=len(sides) - 1)
+    t, inward = rng.random(EDGE_POINTS), 0.6 * rng.random(EDGE_POINTS) ** 2
+    rows, weights = np.arange(EDGE_POINTS), np.zeros((EDGE_POINTS, 3))
+    weights[rows, side[sides[pick]]] = (1 - inward) * (1 - t)
+    weights[rows, (side[sides[pick]] + 1) % 3] = (1 - inward) * t
+    weights[rows, (side[sides[pick]] + 2) % 3] = inward
+    return owner[sides[pick]], weights
+
+
+def convexity(point: Array, normal: Array) -> Array:
+    """How far the surface around each point falls off below its tangent plane, against its distance: about 0.4 on a right-angled
+    edge, 0 on a plane, negative in a crease. Args: (S, 3) each. Returns: (S,)."""
+    distance, index = cKDTree(point).query(point, NEAR, distance_upper_bound=REACH)
+    found = np.isfinite(distance) & (distance > 0)
+    index = np.where(found, index, 0)
+    offset = point[index] - point[:, None]
+    found &= (normal[index] * normal[:, None]).sum(-1) > -0.7  # not the other side of a thin wall
+    drop = np.where(found, -(offset * normal[:, None]).sum(-1), 0).sum(1)
+    total = np.where(found, distance, 0).sum(1)
+    return np.where(total > 0, drop / np.maximum(total, 1e-12), 0).astype(np.float32)
+
+
+def occlusion(point: Array, normal: Array, flat: Array, blocked: Blocked, rng: np.random.Generator) -> Array:
+    """Share of the sky, weighted by the cosine, that the object hides from each point; averaged with its neighbours.
+
+    Args:
+        point, normal: (S, 3). flat: (S, 3) normal of the triangle itself, on whose outer side the rays begin.
+    """
+    side = np.sign((flat * normal).sum(1, keepdims=True))
+    origin = point + OFFSET * np.where(side < 0, -flat, flat)
+    hits = np.zeros(len(point), np.float32)
+    golden = (np.sqrt(5) - 1) / 2
+    for k in range(RAYS):
+        u = (k + rng.random(len(point))) / RAYS
+        angle = 2 * np.pi * ((k * golden + rng.random(len(point)) / RAYS) % 1)
+        z, r = 1 - 2 * u, 2 * np.sqrt(u * (1 - u))
+        direction = normal + np.stack([r * np.cos(angle), r * np.sin(angle), z], 1).astype(np.float32)  # cosine-weighted
+        hits += blocked(origin, direction)
+    distance, index = cKDTree(point).query(point, 4, distance_upper_bound=REACH / 2)
+    weight = np.where(np.isfinite(distance), 1.0, 0.0)
+    near = np.where(np.isfinite(distance), index, 0)
+    weight *= (normal[near] * normal[:, None]).sum(-1) > 0.7
+    return ((weight * hits[near]).sum(1) / np.maximum(weight.sum(1), 1) / RAYS).astype(np.float32)
+
+
+EMPTY = Survey(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32), *np.zeros((2, 1), np.float32),
+               np.zeros(1, np.int32), WHOLE)  # fmt: skip
+"""Of a thing of which nothing is known."""
