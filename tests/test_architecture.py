@@ -10,14 +10,15 @@ ROOT = Path(__file__).resolve().parent.parent
 ALLOWED = {
     "core": set(),
     "light": {"core"},
-    "prior": {"core"},
+    "material": {"core"},
+    "prior": {"core", "material"},
     "sd": {"core"},
-    "prep": {"core", "light", "prior"},
-    "conditions": {"core", "light", "prior"},
-    "distill": {"core", "light", "prior", "sd"},
-    "bake": {"core", "light", "prior"},
-    "train": {"core", "light", "prior", "sd", "prep", "conditions", "distill", "bake"},
-    "report": {"core", "light", "prior", "sd", "prep", "conditions", "distill", "bake", "train"},
+    "prep": {"core", "light", "material", "prior"},
+    "conditions": {"core", "light", "material", "prior"},
+    "distill": {"core", "light", "material", "prior", "sd"},
+    "bake": {"core", "light", "material", "prior"},
+    "train": {"core", "light", "material", "prior", "sd", "prep", "conditions", "distill", "bake"},
+    "report": {"core", "light", "material", "prior", "sd", "prep", "conditions", "distill", "bake", "train"},
 }
 
 SOURCES = sorted(path for package in ("stages", "dreammat_cli") for path in (ROOT / package).rglob("*.py"))

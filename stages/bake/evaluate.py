@@ -1,15 +1,15 @@
-"""Fast evaluation of the material field, for inference only.
+"""Fast evaluation of the residual, for inference only.
 
 Texels are visited row by row, so neighbouring points mostly share their cells of the coarser grids: a cell's corners
 are fetched once and kept until a point leaves it, and the network runs in the same pass, out of the processor's cache.
-`MaterialField.forward` is the plain form of the same; a test holds the two together.
+`Residual.forward` is the plain form of the same; a test holds the two together.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.bake.jit import compiled, in_parallel
-from stages.core.field import HASH_PRIMES, OUTPUTS, MaterialField
+from stages.material.residual import HASH_PRIMES, OUTPUTS, Residual
 
 BLOCK = 256
 """Points that go through the network at a time."""
@@ -20,15 +20,15 @@ TASK = 1 << 18
 PRIME_Y, PRIME_Z = np.uint32(HASH_PRIMES[1]), np.uint32(HASH_PRIMES[2])
 
 
-def evaluate(field: MaterialField, points: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Material of world points.
+def evaluate(residual: Residual, points: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What was learnt at world points.
 
     Args:
         points: (N, 3).
     Returns:
-        (N, 5) in [0, 1]: red, green and blue of the linear albedo, roughness, metallic.
+        (N, 5) logits for red, green and blue of the linear albedo, roughness, metallic.
     """
-    arrays, layout = field.to_arrays(), field.config.layout()
+    arrays, layout = residual.to_arrays(), residual.config.layout()
     w0, b0, w1, b1 = (arrays[name] for name in ("weights_0", "bias_0", "weights_1", "bias_1"))
     result = np.empty((len(points), OUTPUTS), np.float32)
 
@@ -52,12 +52,12 @@ def _evaluate(points, table, layout, w0, b0, w1, b1, result):  # type: ignore[no
         _network(features[:, start : start + count], w0, b0, w1, b1, hidden[:count], outputs)
         for i in range(count):
             for o in range(len(outputs)):
-                result[start + i, o] = np.float32(1) / (np.float32(1) + np.exp(-outputs[o, i]))
+                result[start + i, o] = outputs[o, i]
 
 
 @compiled
 def _encode_level(points, table, resolution, first, entries, features):  # type: ignore[no-untyped-def]
-    """Trilinear features of one level into `features` (2, N); see `stages.core.field.encode_reference`."""
+    """Trilinear features of one level into `features` (2, N); see `stages.material.residual.encode_reference`."""
     corners = np.empty((8, 2), np.float32)
     side = resolution + 1
     direct = side * side * side <= entries
@@ -87,7 +87,7 @@ def _encode_level(points, table, resolution, first, entries, features):  # type:
 
 @compiled
 def _network(features, w0, b0, w1, b1, hidden, outputs):  # type: ignore[no-untyped-def]
-    """One hidden layer, without the final sigmoids, on all points of a block at once: the inner loops are vectors.
+    """One hidden layer, on all points of a block at once: the inner loops are vectors.
 
     features: (inputs, N), N up to BLOCK. w0, w1: (out, in). hidden: (N,) scratch. outputs: (5, BLOCK) result.
     """

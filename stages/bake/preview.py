@@ -110,7 +110,7 @@ def draw_view(
     coarse = trace_view(scene, c2w, FOV_Y, size, size)
     if coarse.mask.any():
         transport = light_transport(scene, coarse, [light], RAYS, seed=0)[0]
-        values = torch.from_numpy(sampled)
+        values = torch.from_numpy(sampled[:, :5])
         material = Material.of(values)
         nearest = torch.from_numpy(_nearest_hit(coarse.mask)[mask])
         color[mask] = EXPOSURE * shade(transport[nearest], material).numpy()

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from stages.bake.fill import fill_unseen, pad
@@ -14,7 +15,7 @@ from stages.bake.options import BakeOptions
 from stages.bake.preview import contact_sheet
 from stages.bake.raster import Layout, Surface, touched_texels
 from stages.bake.source import source_model
-from stages.bake.texels import bake_texels
+from stages.bake.texels import Texels
 from stages.bake.textures import write_textures
 from stages.bake.visibility import Views, is_open, patches, seen_points
 from stages.bake.wavefront import write_obj
@@ -32,11 +33,12 @@ from stages.core.artifact import (
     write_manifest,
 )
 from stages.core.errors import ArtifactError, OutputError
-from stages.core.field import MaterialField
 from stages.core.images import write_png
 from stages.core.progress import Progress, silent
 from stages.core.schemas import ASSET, MATERIAL, PREP
 from stages.light.scene import Scene
+from stages.material.learnt import LearntMaterial
+from stages.material.residual import combined
 
 
 @dataclass(frozen=True)
@@ -100,24 +102,16 @@ def bake(
     known = peek(out, ASSET)
     if known and known.same_request(wanted) and not force:
         return BakeResult(out, True, sorted(read_manifest(out, ASSET)[1]), known.extra)
-    field = material_field(material, made)
+    learnt = LearntMaterial.of(material, made)
     with run_log(out) as measured:
         subject = Subject.of(prep, mesh, options.size)
         open_folder(out)
-        maps, coverage = bake_maps(subject, made, field, options, progress)
+        maps, coverage = bake_maps(subject, made, learnt, options, progress)
         files, notes = write_asset(out, subject, maps, options, progress)
         report = {**describe(mesh, made), **coverage, **notes}
         write_manifest(out, ASSET, Provenance(wanted.options, wanted.seed, inputs, report), files)
         measured["texture_size"] = options.size
     return BakeResult(out, False, sorted(files), report)
-
-
-def material_field(path: Path, made: Artifact) -> MaterialField:
-    """The field of material.npz. Raises: ArtifactError when header and arrays disagree."""
-    try:
-        return MaterialField.from_arrays(made.provenance.extra["field"], made.arrays)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ArtifactError(f"{path}: its field does not fit its header ({error}); distill it again") from error
 
 
 def open_folder(out: Path) -> None:
@@ -134,27 +128,31 @@ def open_folder(out: Path) -> None:
 
 
 def bake_maps(
-    subject: Subject, made: Artifact, field: MaterialField, options: BakeOptions, progress: Progress
+    subject: Subject, made: Artifact, learnt: LearntMaterial, options: BakeOptions, progress: Progress
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Albedo, roughness and metallic of every texel, to the last one.
+    """Albedo, roughness, metallic and height of every texel, to the last one.
 
     Returns:
-        (size, size, 5); the shares of texels on charts and, of these, that no view saw.
+        (size, size, 6), the height in object sizes; the shares of texels on charts and, of these, that no view saw.
     """
     on_chart = subject.touched.triangle >= 0
-    corners = subject.mesh["vertices"][subject.mesh["triangles"]]
-    maps = bake_texels(field, corners, subject.layout, subject.touched, options.supersample, progress)
-    unseen = mend_unseen(subject, views_of(made), maps, progress)
+    mesh = subject.mesh
+    texels = Texels(learnt, mesh["vertices"][mesh["triangles"]], mesh["normals"], subject.layout, subject.touched)
+    residual = texels.residual()
+    unseen = mend_unseen(subject, views_of(made), residual, progress)
+    maps = texels.recipe(options.supersample, progress)
+    values = combined(*(torch.from_numpy(a[on_chart]) for a in (maps[..., :5], residual)))
+    maps[on_chart, :5] = values.numpy()
     progress("padding", 0, 1)
     pad(maps, on_chart)
     return maps, {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
 
 
-def mend_unseen(subject: Subject, views: Views, maps: NDArray[np.float32], progress: Progress) -> float:
-    """Fill, in place, the texels that no view saw from seen surface nearby; all stay when none was seen.
+def mend_unseen(subject: Subject, views: Views, residual: NDArray[np.float32], progress: Progress) -> float:
+    """Fill, in place, what was learnt at texels that no view saw from seen surface nearby; all stay when none was seen.
 
     Args:
-        maps: (H, W, 5).
+        residual: (H, W, 5).
     Returns:
         the share of texels on charts that no view saw.
     """
@@ -166,10 +164,10 @@ def mend_unseen(subject: Subject, views: Views, maps: NDArray[np.float32], progr
     texel_seen = seen[groups.of_texel]
     if seen.any() and not seen.all():
         progress("filling", 0, 1)
-        values = maps[on_chart]
+        values = residual[on_chart]
         known, wanted = subject.points(first[seen]), subject.points(surface[~texel_seen])
         values[~texel_seen] = fill_unseen(known, groups.mean(values)[seen], wanted)
-        maps[on_chart] = values
+        residual[on_chart] = values
     return float((~texel_seen).mean())
 
 

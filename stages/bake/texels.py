@@ -1,60 +1,123 @@
-"""The material of every texel: the mean over the samples inside it that lie on a chart.
+"""The material of every texel: the recipe's mean over the samples inside it that lie on a chart, and what was learnt there.
 
 Each sample is evaluated at its own point in space, so a texel on a chart's rim holds nothing from outside. A texel
-that a chart touches without covering any of its samples takes the surface point nearest to its centre.
+that a chart touches without covering any of its samples takes the surface point nearest to its centre. The residual is as smooth
+as the views were coarse: it is looked up once a texel.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.evaluate import evaluate
+from stages.bake.evaluate import evaluate as evaluate_residual
 from stages.bake.jit import compiled, in_parallel
 from stages.bake.raster import Layout, Surface, bands, covered_samples
-from stages.core.field import OUTPUTS, MaterialField
 from stages.core.progress import Progress
+from stages.material import surface as material_surface
+from stages.material.evaluate import COLUMNS, evaluate
+from stages.material.learnt import LearntMaterial
+from stages.material.residual import OUTPUTS
 
 TASKS = 8
 """Bands between two reports of progress."""
 
+SAMPLES = 1 << 15
+"""Evaluated together: what they need stays in a core's cache."""
 
-def bake_texels(
-    field: MaterialField,
-    corners: NDArray[np.float32],
-    layout: Layout,
-    touched: Surface,
-    supersample: int,
-    progress: Progress,
-) -> NDArray[np.float32]:
-    """Evaluate the field for every texel that a chart touches.
+
+class Texels:
+    """A material on the surface that a UV layout shows.
 
     Args:
-        corners: (F, 3, 3) world positions of the triangles' corners. touched: of `touched_texels`.
-        supersample: samples along each edge of a texel.
-    Returns:
-        (size, size, 5) albedo, roughness and metallic; 0 off the charts.
+        corners, normals: (F, 3, 3) world positions and normals of the triangles' corners. touched: of `touched_texels`.
     """
-    size = layout.size
-    maps, counts = np.zeros((size, size, OUTPUTS), np.float32), np.zeros((size, size), np.int32)
-    todo = bands(size)
 
-    def bake_band(rows: range) -> None:
-        surface = covered_samples(layout, supersample, rows)
-        on_chart = surface.triangle >= 0
-        values = evaluate(field, surface.where(on_chart).interpolate(corners))
-        _average(on_chart, values, supersample, maps[rows.start : rows.stop], counts[rows.start : rows.stop])
+    def __init__(
+        self, made: LearntMaterial, corners: NDArray[np.float32], normals: NDArray[np.float32], layout: Layout, touched: Surface
+    ) -> None:
+        self._made, self._corners, self._normals = made, corners, normals
+        self._layout, self._touched = layout, touched
+        self._texel = texel_size(corners, layout)
+        centre, mean = corners.mean(1), normals.mean(1)
+        self._piece = made.lookup.surface(centre, mean, self._texel).piece  # (F,)
 
-    for first in range(0, len(todo), TASKS):
-        progress("texels", first, len(todo))
-        in_parallel(bake_band, todo[first : first + TASKS])
-    bare = (counts == 0) & (touched.triangle >= 0)
-    maps[bare] = evaluate(field, touched.where(bare).interpolate(corners))
-    progress("texels", len(todo), len(todo))
-    return maps
+    def residual(self) -> NDArray[np.float32]:
+        """What was learnt at every texel that a chart touches: (size, size, 5) logits, 0 off the charts."""
+        on_chart = self._touched.triangle >= 0
+        values = np.zeros((*on_chart.shape, OUTPUTS), np.float32)
+        values[on_chart] = evaluate_residual(self._made.residual, self._touched.where(on_chart).interpolate(self._corners))
+        return values
+
+    def recipe(self, supersample: int, progress: Progress) -> NDArray[np.float32]:
+        """The recipe's material of every texel that a chart touches: (size, size, 6), see `COLUMNS`; 0 off the charts.
+
+        Args:
+            supersample: samples along each edge of a texel.
+        """
+        size = self._layout.size
+        maps, counts = np.zeros((size, size, COLUMNS), np.float32), np.zeros((size, size), np.int32)
+        todo = bands(size)
+
+        def bake_band(rows: range) -> None:
+            band = slice(rows.start, rows.stop)
+            samples = covered_samples(self._layout, supersample, rows)
+            on_chart = samples.triangle >= 0
+            row, column = (k // supersample for k in np.nonzero(on_chart))
+            values = self._evaluate(samples.where(on_chart), supersample, self._features(rows), row * size + column)
+            _average(on_chart, values, supersample, maps[band], counts[band])
+            bare = (counts[band] == 0) & (self._touched.triangle[band] >= 0)
+            some = Surface(self._touched.triangle[band][bare], self._touched.barycentric[band][bare])
+            maps[band][bare] = self._evaluate(some, 1, self._features(rows), np.flatnonzero(bare))
+
+        for first in range(0, len(todo), TASKS):
+            progress("texels", first, len(todo))
+            in_parallel(bake_band, todo[first : first + TASKS])
+        progress("texels", len(todo), len(todo))
+        return maps
+
+    def _features(self, rows: range) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Convexity and occlusion of each texel of some rows, flat; None where the recipe asks for neither."""
+        if not self._made.recipe.follows_surface:
+            return None
+        triangle = self._touched.triangle[rows.start : rows.stop]
+        on_chart = triangle >= 0
+        some = Surface(triangle[on_chart], self._touched.barycentric[rows.start : rows.stop][on_chart])
+        point, normal = some.interpolate(self._corners), some.interpolate(self._normals)
+        found = self._made.lookup.surface(point, normal, self._texel[some.triangle])
+        features = np.zeros((2, triangle.size), np.float32)
+        features[:, on_chart.ravel()] = found.convexity, found.occlusion
+        return features[0], features[1]
+
+    def _evaluate(self, samples: Surface, supersample: int, features, texel) -> NDArray[np.float32]:  # type: ignore[no-untyped-def]
+        """Recipe at samples on charts, (N, 6). Args: features: of `_features`; texel: (N,) of each sample among them."""
+        result = np.empty((len(samples.triangle), COLUMNS), np.float32)
+        for start in range(0, len(result), SAMPLES):
+            rows = slice(start, start + SAMPLES)
+            some = Surface(samples.triangle[rows], samples.barycentric[rows])
+            footprint = self._texel[some.triangle] / np.float32(supersample)
+            zero = np.zeros(len(footprint), np.float32)
+            convexity, occlusion = (zero, zero) if features is None else (f[texel[rows]] for f in features)
+            point, normal = some.interpolate(self._corners), some.interpolate(self._normals)
+            piece = self._piece[some.triangle]
+            surface = material_surface.Surface(point, normal, footprint, convexity, occlusion, piece)
+            result[rows] = evaluate(self._made.recipe, surface, self._made.lookup.survey.pieces)
+        return result
+
+
+def texel_size(corners: NDArray[np.float32], layout: Layout) -> NDArray[np.float32]:
+    """Edge of a texel on each triangle, world units, (F,): the root of its area by its area in texels."""
+    a, b = (corners[:, k].astype(np.float64) - corners[:, 0] for k in (1, 2))
+    area = np.linalg.norm(np.cross(a, b), axis=1)
+    p, q = (layout.corners[:, k] - layout.corners[:, 0] for k in (1, 2))
+    texels = abs(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
+    known = (texels > 1e-6) & (area > 0)
+    size = np.sqrt(area / np.where(known, texels, 1))
+    usual = float(np.sqrt(area[known].sum() / texels[known].sum())) if known.any() else 1 / layout.size
+    return np.where(known, np.clip(size, usual / 16, usual * 16), usual).astype(np.float32)
 
 
 @compiled
 def _average(on_chart, values, supersample, maps, counts):  # type: ignore[no-untyped-def]
-    """Mean of the samples of each texel. values: (N, 5) of the samples on a chart, row by row."""
+    """Mean of the samples of each texel. values: (N, C) of the samples on a chart, row by row."""
     taken = 0
     for i in range(on_chart.shape[0]):
         for j in range(on_chart.shape[1]):

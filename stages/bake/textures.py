@@ -70,5 +70,5 @@ def write_textures(folder: Path, maps: NDArray[np.float32], grey: bool) -> list[
 def orm(maps: NDArray[np.float32]) -> NDArray[np.uint8]:
     """glTF's packed texture. Args: maps (H, W, 5). Returns: (H, W, 3)."""
     packed = np.full((*maps.shape[:2], 3), 255, np.uint8)
-    packed[..., 1:] = to_8bit(maps[..., 3:])
+    packed[..., 1:] = to_8bit(maps[..., 3:5])
     return packed

@@ -29,7 +29,7 @@ from stages.core.artifact import (
 )
 from stages.core.errors import InputError, NumericalError, OutputError
 from stages.core.progress import Progress, silent
-from stages.core.schemas import CAMERAS, CONDITIONS, PREP
+from stages.core.schemas import CAMERAS, CONDITIONS, PREP, SURVEY
 from stages.core.shading import KNOTS, Transport
 from stages.core.views import (
     SD,
@@ -47,6 +47,7 @@ from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.lights import BUILTIN
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, Quality, light_transport
+from stages.material.survey import make_survey
 
 REQUEST = "request.json"
 """What an unfinished folder was asked for; a rerun that asks for the same continues it."""
@@ -89,6 +90,8 @@ def conditions(
         for light in lights:
             save_environment(out / "environments" / f"{light.name}.exr", light)
         scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.occluded)
+        save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None
         quality, expected = QUALITY[options.quality], None
         if options.error:
@@ -153,7 +156,7 @@ def start_folder(out: Path, request: Provenance, force: bool) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         if force or read_json(out / REQUEST) != asked:
-            for name in (MANIFEST, REQUEST, "cameras.npz", "sheet.png", "run.json"):
+            for name in (MANIFEST, REQUEST, "cameras.npz", "survey.npz", "sheet.png", "run.json"):
                 (out / name).unlink(missing_ok=True)
             for folder in [out / "environments", *out.glob("view_[0-9][0-9][0-9]*")]:
                 shutil.rmtree(folder, ignore_errors=True)
@@ -185,7 +188,7 @@ def view_files(view: int, names: tuple[str, ...], options: ConditionsOptions) ->
 def expected_files(names: tuple[str, ...], options: ConditionsOptions) -> list[str]:
     """Relative paths of everything a complete folder holds."""
     views = [file for view in range(options.views) for file in view_files(view, names, options)]
-    return ["cameras.npz", "sheet.png", *(f"environments/{name}.exr" for name in names), *views]
+    return ["cameras.npz", "survey.npz", "sheet.png", *(f"environments/{name}.exr" for name in names), *views]
 
 
 @dataclass(frozen=True)

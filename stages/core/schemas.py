@@ -46,18 +46,36 @@ CAMERAS = Schema(
 
 CONDITIONS = Schema(
     "dreammat.conditions",
-    1,
+    2,
     # environments: names; views: count; knots: roughness of each A and B; clamped: name -> mended texels;
     # to_world: 16 numbers, the mesh source's frame to world, row by row; profile: "gltf", or "sd", which has files of its own
     extra=("environments", "views", "knots", "clamped", "to_world"),
 )
-"""A folder: cameras.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr; see `core.views`."""
+"""A folder: cameras.npz, survey.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr; see `core.views`."""
+
+SURVEY = Schema(
+    "dreammat.survey",
+    1,
+    {
+        "survey_point": Field("f4", ("Q", 3)),  # points of the surface, world
+        "survey_normal": Field("f2", ("Q", 3)),
+        "survey_convexity": Field("f2", ("Q",)),  # -1 in a crease to 1 on an edge
+        "survey_occlusion": Field("f2", ("Q",)),  # share of the sky that the object hides
+        "survey_piece": Field("i4", ("Q",)),  # row of the pieces; 0 is the whole object
+        "pieces_centre": Field("f4", ("PK", 3)),
+        "pieces_turn": Field("f4", ("PK", 3, 3)),
+        "pieces_radius": Field("f4", ("PK",)),
+        "pieces_grain": Field("f4", ("PK", 3)),
+    },
+)
+"""What a material must know of a mesh; see `material.survey`."""
 
 MATERIAL = Schema(
     "dreammat.material",
-    1,
+    2,
     {
-        "table": Field("f4", ("T", "C")),  # hash grid entries, all levels in one table
+        **SURVEY.fields,
+        "table": Field("f4", ("T", "C")),  # the residual's hash grid entries, all levels in one table
         "weights_0": Field("f4", ("H0", "I0")),  # MLP, (out, in) each
         "weights_1": Field("f4", ("H1", "H0")),
         "bias_0": Field("f4", ("H0",)),
@@ -68,8 +86,9 @@ MATERIAL = Schema(
         "fov_y": Field("f8", ("N",)),
         "size": Field("i4", (2,)),  # width, height of those views
     },
-    # field: FieldConfig as a dict; prompt; guidance: name and what identifies its model; environments: names used
-    extra=("field", "prompt", "guidance", "environments"),
+    # recipe: as `material.recipe` writes it; residual: ResidualConfig as a dict; prompt; guidance: name and what identifies its
+    # model; environments: names used
+    extra=("recipe", "residual", "prompt", "guidance", "environments"),
 )
 
 ASSET = Schema("dreammat.asset", 1, manifest="bake.json")

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import Artifact, Field, Provenance, Schema, load_npz, save_npz
 from stages.core.errors import ArtifactError
-from stages.core.field import MaterialField
 from stages.distill.optimizer import RowAdam
+from stages.material.residual import Residual
 
 SECONDS = 60.0
 """Time between checkpoints."""
@@ -32,7 +32,7 @@ GRACE = 3.0
 _NETWORK = ("weights_0", "weights_1", "bias_0", "bias_1")
 CHECKPOINT = Schema(
     "dreammat.distill.checkpoint",
-    1,
+    2,
     {
         "table": Field("f4", ("T", "C")),
         "m.table": Field("f4", ("T", "C")),
@@ -49,9 +49,9 @@ CHECKPOINT = Schema(
 
 @dataclass
 class State:
-    """A run between two steps: field, optimiser, and of every step done its loss and the seconds since the start."""
+    """A run between two steps: residual, optimiser, and of every step done its loss and the seconds since the start."""
 
-    field: MaterialField
+    residual: Residual
     optimizer: RowAdam
     loss: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
@@ -76,7 +76,7 @@ def checkpoint_path(out: Path) -> Path:
 def save(out: Path, state: State, request: Provenance) -> None:
     """Write the checkpoint, atomically."""
     curve: dict[str, NDArray] = {"loss": np.array(state.loss, np.float32), "seconds": np.array(state.seconds, np.float64)}
-    arrays: dict[str, NDArray] = {**state.field.to_arrays(), **state.optimizer.to_arrays(), **curve}
+    arrays: dict[str, NDArray] = {**state.residual.to_arrays(), **state.optimizer.to_arrays(), **curve}
     save_npz(checkpoint_path(out), CHECKPOINT, arrays, request)
 
 
@@ -89,7 +89,7 @@ def resume(out: Path, state: State, request: Provenance) -> bool:
     if not stored.provenance.same_request(request) or not _fits(stored, state):
         return False
     with torch.no_grad():
-        for name, parameter in state.field.named_parameters():
+        for name, parameter in state.residual.named_parameters():
             parameter.copy_(torch.from_numpy(stored[name]))
     state.loss, state.seconds = stored["loss"].tolist(), stored["seconds"].tolist()
     state.optimizer.load_arrays(stored.arrays, state.step)
@@ -97,7 +97,7 @@ def resume(out: Path, state: State, request: Provenance) -> bool:
 
 
 def _fits(stored: Artifact, state: State) -> bool:
-    return all(stored[name].shape == tuple(p.shape) for name, p in state.field.named_parameters())
+    return all(stored[name].shape == tuple(p.shape) for name, p in state.residual.named_parameters())
 
 
 @contextlib.contextmanager

@@ -8,10 +8,11 @@ import torch
 from numpy.typing import NDArray
 
 from stages.core.color import reinhard, srgb_encode
-from stages.core.field import MaterialField
 from stages.core.images import write_png
 from stages.core.shading import shade
+from stages.distill.base import Base
 from stages.distill.views import Views
+from stages.material.residual import Residual
 
 ROWS = 4
 """Views shown, evenly spread over those there are."""
@@ -23,22 +24,24 @@ EXPOSURE = 1.5
 """Radiance before the tone curve, relative to a mean of 1 on a white diffuse object."""
 
 
-def write_preview(path: Path, views: Views, field: MaterialField, device: torch.device) -> None:
+def write_preview(path: Path, views: Views, base: Base, residual: Residual) -> None:
     """Write the contact sheet as a PNG."""
     chosen = [views.seen[i * len(views.seen) // ROWS] for i in range(min(ROWS, len(views.seen)))]
-    rows = [_row(views, view, i % len(views.environments), field, device) for i, view in enumerate(chosen)]
+    rows = [_row(views, view, i % len(views.environments), base, residual) for i, view in enumerate(chosen)]
     write_png(path, np.concatenate(rows, 0))
 
 
 @torch.no_grad()
-def _row(views: Views, view: int, environment: int, field: MaterialField, device: torch.device) -> NDArray[np.float32]:
+def _row(views: Views, view: int, environment: int, base: Base, residual: Residual) -> NDArray[np.float32]:
     """Four pictures of one view side by side, (S, 4 S, 3), encoded for display."""
+    device = residual.table.device
     stride = math.ceil(max(views.width, views.height) / SIZE)
     row, column = np.divmod(views.pixels(view), views.width)
     shown = np.flatnonzero((row % stride == 0) & (column % stride == 0))
     surface = views.surface(view, shown)
     transport = views.read_transport((view, environment))[torch.from_numpy(shown)].to(device, torch.float32)
-    material = field(surface.points.to(device))
+    footprint = torch.from_numpy(stride * views.footprint(view, surface.depth.numpy()))
+    material = base.material(residual, *(t.to(device) for t in (surface.points, surface.normals, footprint)))
     scale = EXPOSURE / transport.E.mean().clamp(min=1e-6)
     pictures = (
         srgb_encode(reinhard(scale * shade(transport, material))),

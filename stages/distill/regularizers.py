@@ -3,11 +3,14 @@
 import torch
 from torch import Tensor
 
-from stages.core.color import luminance, srgb_decode, srgb_encode
+from stages.core.color import luminance
 from stages.core.shading import Material
 
 DIM = 0.05
 """Irradiance, and albedo, at which the logarithmic scale turns linear: as a share of the mean light, and absolute."""
+
+SLOPE = 0.25
+"""Steepest slope of a sigmoid: how far a material's value moves for one unit of its logit."""
 
 REACH = 0.05
 """Standard deviation of the smoothness loss's displacement, world units. Source: Zhang et al. 2024, DreamMat, Section 3.3."""
@@ -19,11 +22,9 @@ def displaced(points: Tensor, normals: Tensor, generator: torch.Generator) -> Te
     return points + step - normals * (normals * step).sum(-1, keepdim=True)
 
 
-def smoothness(material: Material, nearby: Material) -> Tensor:
-    """‖Γ(p) - Γ(p + ε)‖², mean over points. Differentiable in: both."""
-    albedo = (material.albedo - nearby.albedo).square().sum(-1)
-    rest = (material.roughness - nearby.roughness).square() + (material.metallic - nearby.metallic).square()
-    return (albedo + rest).mean()
+def smoothness(residual: Tensor, nearby: Tensor) -> Tensor:
+    """‖Γ(p) - Γ(p + ε)‖² of what was learnt, mean over points. Args: (P, 5) logits. Differentiable in: both."""
+    return (residual - nearby).square().sum(-1).mean() * SLOPE**2
 
 
 def bimodality(metallic: Tensor) -> Tensor:
@@ -31,29 +32,20 @@ def bimodality(metallic: Tensor) -> Tensor:
     return (metallic * (1 - metallic)).mean()
 
 
-def encoded(values: Tensor) -> Tensor:
-    """Materials (P, 5) with their albedo as sRGB, in which dark colours count. Differentiable in: values."""
-    return torch.cat([srgb_encode(values[:, :3]), values[:, 3:]], 1)
+def hold(residual: Tensor) -> Tensor:
+    """Squared norm of what was learnt, mean over points, on the scale of the material. Args: (P, 5). Differentiable in: it."""
+    return residual.square().sum(-1).mean() * SLOPE**2
 
 
-def distance(material: Material, expected: Tensor) -> Tensor:
-    """Squared distance from an expected material, mean over points. Differentiable in: material.
-
-    Args:
-        expected: (P, 5) sRGB albedo, roughness, metallic.
-    """
-    return (encoded(material.columns()) - expected).square().sum(1).mean()
-
-
-def baked_light(material: Material, expected: Tensor, irradiance: Tensor) -> Tensor:
-    """How much of what departs from an expected albedo follows the light: the variance that log irradiance explains.
+def baked_light(material: Material, base: Tensor, irradiance: Tensor) -> Tensor:
+    """How much of what departs from the recipe's albedo follows the light: the variance that log irradiance explains.
 
     Differentiable in: material.
 
     Args:
-        expected: (P, 5) sRGB albedo, roughness, metallic. irradiance: (P, 3) linear, of any scale.
+        base: (P, 5) linear albedo, roughness, metallic. irradiance: (P, 3) linear, of any scale.
     """
-    departure = torch.log((luminance(material.albedo) + DIM) / (luminance(srgb_decode(expected[:, :3])) + DIM))
+    departure = torch.log((luminance(material.albedo) + DIM) / (luminance(base[:, :3]) + DIM))
     light = luminance(irradiance)
     light = torch.log(light / light.mean().clamp(min=1e-9) + DIM)
     light = light - light.mean()

@@ -47,7 +47,7 @@ class Images:
 
 @dataclass(frozen=True)
 class Sample:
-    """What one step shows: P points (P, 3) with normals (P, 3), world, each under `lights` = L lights.
+    """What one step shows: P points (P, 3) with normals (P, 3) and footprints (P,), world, each under `lights` = L lights.
 
     transport: of P L rows, all lights of a point after each other. source: (view, environment) of each image, for messages.
     images: the layout of crops; rows: (P,) of loose pixels in their pool. The one that does not apply is None.
@@ -55,6 +55,7 @@ class Sample:
 
     points: Tensor
     normals: Tensor
+    footprint: Tensor
     lights: int
     transport: Transport
     source: tuple[tuple[int, int], ...] = ()
@@ -66,7 +67,8 @@ class Sample:
         assert self.rows is not None
         lit = (chosen[:, None] * self.lights + torch.arange(self.lights, device=chosen.device)).flatten()
         rows = self.rows[chosen.to(self.rows.device)]
-        return Sample(self.points[chosen], self.normals[chosen], self.lights, self.transport[lit], rows=rows)
+        points, normals, footprint = (t[chosen] for t in (self.points, self.normals, self.footprint))
+        return Sample(points, normals, footprint, self.lights, self.transport[lit], rows=rows)
 
 
 class Sampler(Protocol):
@@ -92,24 +94,29 @@ class CropSampler:
     def draw(self, generator: torch.Generator) -> Sample:
         keys = self._keys(generator)
         crops = [self._crop(view, generator) for view, _ in keys]
-        lights = [self._views.transport(*key)[torch.from_numpy(rows)] for key, (rows, _) in zip(keys, crops, strict=True)]
-        surfaces = [self._views.surface(key[0], rows) for key, (rows, _) in zip(keys, crops, strict=True)]
+        lights = [self._views.transport(*key)[torch.from_numpy(rows)] for key, (rows, *_) in zip(keys, crops, strict=True)]
+        surfaces = [self._views.surface(key[0], rows) for key, (rows, *_) in zip(keys, crops, strict=True)]
+        footprint = [
+            torch.from_numpy(stride * self._views.footprint(key[0], surface.depth.numpy()))
+            for key, surface, (*_, stride) in zip(keys, surfaces, crops, strict=True)
+        ]
         surface = Surface(*(self._join(surfaces, name) for name in Surface.__annotations__))
         transport = Transport(*(self._join(lights, name) for name in Transport.__annotations__))
-        pixel = np.concatenate([at + i * self._size**2 for i, (_, at) in enumerate(crops)])
+        pixel = np.concatenate([at + i * self._size**2 for i, (_, at, _) in enumerate(crops)])
         eyes = self._views.c2w[[view for view, _ in keys], :3, 3]
         azimuth, elevation = np.arctan2(eyes[:, 1], eyes[:, 0]), np.arcsin(eyes[:, 2] / np.linalg.norm(eyes, axis=1))
         where = torch.from_numpy(pixel).to(self._device)
         images = Images(self._batch, self._size, where, surface, azimuth, elevation, self._maps(keys, crops))
-        return Sample(surface.points, surface.normals, 1, transport, tuple(keys), images=images)
+        width = torch.cat(footprint).to(self._device)
+        return Sample(surface.points, surface.normals, width, 1, transport, tuple(keys), images=images)
 
     def _maps(
-        self, keys: list[tuple[int, int]], crops: list[tuple[NDArray[np.int64], NDArray[np.int64]]]
+        self, keys: list[tuple[int, int]], crops: list[tuple[NDArray[np.int64], NDArray[np.int64], int]]
     ) -> tuple[Tensor, Tensor] | None:
         """Of the profile sd, as in `Images`."""
         if not self._views.has_light_maps:
             return None
-        rows = [torch.from_numpy(rows) for rows, _ in crops]
+        rows = [torch.from_numpy(rows) for rows, *_ in crops]
         normals = [self._views.smooth_normals(view)[chosen] for (view, _), chosen in zip(keys, rows, strict=True)]
         lights = [self._views.light_maps(*key)[chosen] for key, chosen in zip(keys, rows, strict=True)]
         return torch.cat(normals).to(self._device), torch.cat(lights).to(self._device, torch.float32)
@@ -124,8 +131,8 @@ class CropSampler:
         environment = torch.randint(self._lights, (self._batch,), generator=generator).tolist()
         return [(seen[v], e) for v, e in zip(view, environment, strict=True)]
 
-    def _crop(self, view: int, generator: torch.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Rows of the view's object pixels that a random crop shows, and their flat place in the square: (K,) each."""
+    def _crop(self, view: int, generator: torch.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+        """Rows of the view's object pixels that a random crop shows, and their flat place in the square, (K,) each; its stride."""
         views, size = self._views, self._size
         whole = len(self._strides) < 2 or float(torch.rand((), generator=generator)) < WHOLE_VIEW_SHARE
         stride = self._strides[0 if whole else int(torch.randint(1, len(self._strides), (), generator=generator))]
@@ -139,7 +146,7 @@ class CropSampler:
         flat = row[:, None] * views.width + column
         rows = np.searchsorted(pixels, flat).clip(max=len(pixels) - 1)
         shown = inside & (pixels[rows] == flat)
-        return rows[shown].astype(np.int64), np.flatnonzero(shown)
+        return rows[shown].astype(np.int64), np.flatnonzero(shown), stride
 
     def _join(self, parts: list, name: str) -> Tensor:  # type: ignore[type-arg]
         return torch.cat([getattr(part, name) for part in parts]).to(self._device)
@@ -155,7 +162,7 @@ class PixelSampler:
     The pool holds all of them, or as many of each view as the byte budget allows, chosen at random. Draws are even over
     the surface, not over the pixels: a crevice that few views see counts as much as a flank that all of them do.
 
-    points, normals, eyes: (M, 3) world; eyes are the cameras' positions.
+    points, normals, eyes: (M, 3) world; eyes are the cameras' positions. footprint: (M,).
     """
 
     def __init__(self, views: Views, count: int, generator: torch.Generator, device: torch.device) -> None:
@@ -164,6 +171,8 @@ class PixelSampler:
         rows = [_subset(len(views.pixels(view)), share, generator) for view in views.seen]
         surfaces = [views.surface(view, chosen) for view, chosen in zip(views.seen, rows, strict=True)]
         self.points, self.normals = (torch.cat([getattr(s, name) for s in surfaces]) for name in ("points", "normals"))
+        widths = [views.footprint(view, s.depth.numpy()) for view, s in zip(views.seen, surfaces, strict=True)]
+        self.footprint = torch.from_numpy(np.concatenate(widths))
         eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
         self.eyes = torch.from_numpy(eyes.astype(np.float32))
         self._lights = _pooled_lights(views, rows)  # (M, L, WIDTH)
@@ -175,11 +184,12 @@ class PixelSampler:
 
     def at(self, rows: Tensor) -> Sample:
         """The sample of given rows (P,) of the pool."""
-        points, normals, lights = (t.index_select(0, rows) for t in (self.points, self.normals, self._lights))
+        points, normals, footprint = (t.index_select(0, rows) for t in (self.points, self.normals, self.footprint))
+        lights = self._lights.index_select(0, rows)
         packed = lights.to(self.device).float().flatten(0, 1)
         transport = Transport.unpack(packed)
         device = self.device
-        return Sample(points.to(device), normals.to(device), lights.shape[1], transport, rows=rows)
+        return Sample(points.to(device), normals.to(device), footprint.to(device), lights.shape[1], transport, rows=rows)
 
     def prefetch(self, generator: torch.Generator) -> None:
         """Nothing to do: the pool is in memory."""

@@ -15,11 +15,11 @@ from torch import Tensor
 
 from stages.core.artifact import Provenance, peek, plain_options, run_log, save_npz, write_text
 from stages.core.errors import InputError, NumericalError
-from stages.core.field import FieldConfig, MaterialField
 from stages.core.progress import Progress, silent
 from stages.core.schemas import MATERIAL
 from stages.core.shading import Material, shade
 from stages.distill import checkpoint, regularizers, schedule
+from stages.distill.base import Base
 from stages.distill.checkpoint import State, step_generator
 from stages.distill.gauss_newton import logit_gradient, proposal
 from stages.distill.guidance.base import Budget, Guidance, Response
@@ -28,8 +28,10 @@ from stages.distill.optimizer import RowAdam
 from stages.distill.options import QUALITY, DistillOptions
 from stages.distill.preview import write_preview
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
-from stages.distill.start import DRAWS, Start, fit, least_like_light
+from stages.distill.start import least_like_light
 from stages.distill.views import Views
+from stages.material.recipe import Recipe
+from stages.material.residual import Residual, ResidualConfig, combined
 
 SEEN_BY = 3
 """A surface point is taken to be seen by one view in this many."""
@@ -58,6 +60,7 @@ class Run:
     out: Path
     views: Views
     guidance: Guidance
+    base: Base
     options: DistillOptions
     budget: Budget
     request: Provenance
@@ -73,7 +76,7 @@ class Run:
 def distill(
     conditions: Path, out: Path, options: DistillOptions, force: bool = False, progress: Progress = silent
 ) -> DistillResult:
-    """Optimise a material field until its renderings under all views and lights please the guidance.
+    """Learn what to add to a recipe until its renderings under all views and lights please the guidance.
 
     Writes `out` (material.npz), `<stem>.curve.csv` and `<stem>.preview.png` beside it, and while it runs
     `<out>.checkpoint`, from which the same call continues.
@@ -91,10 +94,10 @@ def distill(
     with run_log(out) as log:
         state = new_state(options, views, device)
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
-        if not resumed and guidance.start is not None:
-            fit(state.field, guidance.start, views, step_generator(options.seed, POOL), progress)
         clock = Clock(state.seconds[-1] if resumed else 0.0)
-        run = Run(out, views, guidance, options, budget, request, state, clock)
+        run = Run(out, views, guidance, Base(guidance.recipe, views), options, budget, request, state, clock)
+        if not resumed:
+            _preview(run)  # what the words alone give
         _all_steps(run, progress)
         _write(run)
         _preview(run)
@@ -129,15 +132,13 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
         return _stable_diffusion(options, views, device)
     from stages.distill.guidance import prior
     from stages.prior.model import load_prior
+    from stages.prior.prompt import read_prompt
 
     model = load_prior(device)
     sampler = CropSampler(views, model.size, options.batch, device, options.lights)
 
-    def begin() -> Start:
-        reading, dice = model.read([options.prompt]), np.random.default_rng(options.seed)
-        draws = [reading.recipe(0, dice) for _ in range(DRAWS)]
-        recipe = least_like_light(draws, views, step_generator(options.seed, POOL))
-        return Start(recipe, views, step_generator(options.seed, POOL))
+    def begin() -> Recipe:
+        return least_like_light(read_prompt(options.prompt, model, options.seed), views, step_generator(options.seed, POOL))
 
     return prior.PriorGuidance(model, sampler, options, begin)
 
@@ -153,10 +154,10 @@ def _stable_diffusion(options: DistillOptions, views: Views, device: torch.devic
 
 
 def new_state(options: DistillOptions, views: Views, device: torch.device) -> State:
-    """Field and optimiser before the first step; the finest cells are as far apart as the surface points that all views see."""
+    """Residual and optimiser before the first step; the finest cells are as far apart as the surface points that all views see."""
     spacing = views.pixel_size() / math.sqrt(max(1.0, len(views.seen) / SEEN_BY))
-    field = MaterialField(FieldConfig.for_detail(spacing), torch.Generator().manual_seed(options.seed)).to(device)
-    return State(field, RowAdam(dict(field.named_parameters()), tables=frozenset({"table"})))
+    residual = Residual(ResidualConfig.for_detail(spacing), torch.Generator().manual_seed(options.seed)).to(device)
+    return State(residual, RowAdam(dict(residual.named_parameters()), tables=frozenset({"table"})))
 
 
 def _all_steps(run: Run, progress: Progress) -> None:
@@ -187,8 +188,11 @@ def optimisation_step(run: Run) -> float:
     with clock("data"):
         sample = run.guidance.sampler.draw(generator)
         run.guidance.sampler.prefetch(step_generator(options.seed, state.step + 1))
-    with clock("field"):
-        material, nearby = _materials(state.field, sample, options, generator)
+    with clock("recipe"):
+        base = run.base.of(sample)
+    with clock("residual"):
+        learnt, nearby = _residuals(state.residual, sample, options, generator)
+        material = Material.of(combined(base, learnt))
     with clock("shading"):
         radiance = shade(sample.transport, material)
     with clock("guidance"):
@@ -196,7 +200,7 @@ def optimisation_step(run: Run) -> float:
     if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
-        losses = _regularizers(material, nearby, sample, response, run)
+        losses = _regularizers(Learnt(material, base, learnt, nearby), sample, run)
         if response.curvature is None:
             torch.autograd.backward([radiance, *losses], [response.gradient, *[None] * len(losses)])
         else:
@@ -222,28 +226,38 @@ def _goal(run: Run, response: Response, sample: Sample, values: Tensor, generato
     return goal
 
 
-def _materials(
-    field: MaterialField, sample: Sample, options: DistillOptions, generator: torch.Generator
-) -> tuple[Material, Material | None]:
-    """The material of a sample's points and, for the smoothness loss, of points near them."""
+def _residuals(
+    residual: Residual, sample: Sample, options: DistillOptions, generator: torch.Generator
+) -> tuple[Tensor, Tensor | None]:
+    """What was learnt at a sample's points, (P, 5), and, for the smoothness loss, near them."""
     if options.smoothness == 0:
-        return field(sample.points), None
+        return residual(sample.points), None
     moved = regularizers.displaced(sample.points, sample.normals, generator)
-    both = field(torch.cat([sample.points, moved]))
-    here, nearby = zip(*(values.chunk(2) for values in (both.albedo, both.roughness, both.metallic)), strict=True)
-    return Material(*here), Material(*nearby)
+    here, nearby = residual(torch.cat([sample.points, moved])).chunk(2)
+    return here, nearby
 
 
-def _regularizers(material: Material, nearby: Material | None, sample: Sample, response: Response, run: Run) -> list[Tensor]:
+@dataclass(frozen=True)
+class Learnt:
+    """Of a sample's points: their material, the recipe's (P, 5), the residual's logits (P, 5), and those nearby."""
+
+    material: Material
+    base: Tensor
+    residual: Tensor
+    nearby: Tensor | None
+
+
+def _regularizers(learnt: Learnt, sample: Sample, run: Run) -> list[Tensor]:
     """The weighted losses on the material itself."""
-    options, expected = run.options, response.expected
+    options = run.options
     losses = []
-    if expected is not None:  # words decide what a picture leaves open; a known target needs no such help
-        losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(material.metallic))
-        losses.append(options.anchor * regularizers.distance(material, expected))
-        losses.append(options.anchor * UNLIT * regularizers.baked_light(material, expected, sample.transport.E))
-    if nearby is not None:
-        losses.append(options.smoothness * regularizers.smoothness(material, nearby))
+    if run.guidance.held:  # words decide what a picture leaves open; a known target needs no such help
+        metallic = learnt.material.metallic
+        losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(metallic))
+        losses.append(options.anchor * regularizers.hold(learnt.residual))
+        losses.append(options.anchor * UNLIT * regularizers.baked_light(learnt.material, learnt.base, sample.transport.E))
+    if learnt.nearby is not None:
+        losses.append(options.smoothness * regularizers.smoothness(learnt.residual, learnt.nearby))
     return losses
 
 
@@ -304,8 +318,7 @@ def _beside(out: Path, ending: str) -> Path:
 
 
 def _preview(run: Run) -> None:
-    field = run.state.field
-    write_preview(_beside(run.out, "preview.png"), run.views, field, field.table.device)
+    write_preview(_beside(run.out, "preview.png"), run.views, run.base, run.state.residual)
 
 
 def _write(run: Run) -> None:
@@ -314,12 +327,13 @@ def _write(run: Run) -> None:
     lines = [f"{i},{t:.3f},{loss:.6g}" for i, (t, loss) in enumerate(zip(state.seconds, state.loss, strict=True), 1)]
     write_text(_beside(run.out, "curve.csv"), "step,seconds,loss\n" + "\n".join(lines) + "\n")
     arrays = {
-        **state.field.to_arrays(),
+        **run.base.survey.survey.to_arrays(),
+        **state.residual.to_arrays(),
         "curve_step": np.arange(1, state.step + 1, dtype=np.int32),
         "curve_loss": np.array(state.loss, np.float32),
         "c2w": views.c2w,
         "fov_y": views.fov_y,
         "size": np.array([views.width, views.height], np.int32),
     }
-    extra = {**request.extra, "field": state.field.config_dict()}
+    extra = {**request.extra, "recipe": run.base.recipe.to_json(), "residual": state.residual.config_dict()}
     save_npz(run.out, MATERIAL, arrays, Provenance(request.options, request.seed, request.inputs, extra))

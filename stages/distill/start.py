@@ -1,84 +1,29 @@
-"""Where a distillation begins: what the words alone call for, laid over this very surface.
+"""Which draw of a recipe a run begins with: the one whose patterns follow the light least.
 
-The diffusion model judges pictures; it does not invent a pattern on a plain grey thing within a few hundred steps. So the
-prompt is read as a recipe first (`stages.prior.recipe`), which says what is patterned how and what lies where, the field is
-fitted to that, and the model goes on from there. Seeds draw other patterns of the same material.
+Patterns wider than a shadow follow the light by chance, and what follows the light passes for light that was baked in. Seeds draw
+other patterns of the same material, so there is a choice.
 """
+
+from dataclasses import replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core.color import log_correlation
-from stages.core.convexity import SurfaceSamples
-from stages.core.field import MaterialField
-from stages.core.progress import Progress
-from stages.distill.optimizer import RowAdam
-from stages.distill.regularizers import encoded
 from stages.distill.sampling import even_chance
 from stages.distill.views import Views
-from stages.prior.recipe import BOUND, Recipe, Surface
+from stages.material.evaluate import evaluate
+from stages.material.recipe import Recipe
 
 DRAWS, LIT_VIEWS, LIT_POINTS = 24, 12, 6000
-"""Draws of a prompt's recipe, and the views and points at which they are held against the light."""
-
-SAMPLES = 16_000
-"""Surface points that tell edges from creases."""
-
-RELIEF = 0.07
-"""Share of the surface that counts as its edges, and as its creases, where it has none that are sharp."""
-
-SHARP = 0.3
-"""Convexity of a sharp edge."""
-
-MOST_GAIN = 4.0
-"""How far a rounded edge may be taken for a sharp one."""
-
-STEPS, POINTS, VIEWS = 240, 8192, 4
-"""Of the fit, and what each of its steps looks at."""
-
-LEARNING_RATE = 0.02
+"""Draws of a recipe, and the views and points at which they are held against the light."""
 
 
-class Start:
-    """A recipe on the surface that some views show."""
+def least_like_light(recipe: Recipe, views: Views, generator: torch.Generator) -> Recipe:
+    """The recipe with the seed, of `DRAWS` that follow its own, under which its coats look least like the light.
 
-    def __init__(self, recipe: Recipe, views: Views, generator: torch.Generator) -> None:
-        self._recipe = recipe
-        follows_relief = recipe.layout is not None and recipe.layout.kind in ("edges", "crevices")
-        self._relief = Relief(views, generator) if follows_relief else None
-
-    def __call__(self, points: Tensor, normals: Tensor) -> Tensor:
-        """(P, 5) linear albedo, roughness and metallic of points with normals, (P, 3) each, world."""
-        point, normal = points.cpu().numpy(), normals.cpu().numpy()
-        flat = np.zeros(len(point), np.float32)
-        convexity = flat if self._relief is None else self._relief.convexity(point, normal)
-        surface = Surface(point, normal, convexity, occlusion=flat)
-        return torch.from_numpy(self._recipe.evaluate(surface)).to(points.device)
-
-
-class Relief:
-    """Edges and creases of what the views show, the rounded ones of a smooth thing taken for sharp."""
-
-    def __init__(self, views: Views, generator: torch.Generator) -> None:
-        surface = random_points(views, views.seen, 8 * SAMPLES, generator)
-        chosen = spread_evenly(surface[0], SAMPLES, views, generator)
-        points, normals = (t[chosen].numpy() for t in surface)
-        self._samples = SurfaceSamples(points)
-        low, high = np.quantile(self._samples.convexity(points, normals), (RELIEF, 1 - RELIEF))
-        self._gain = tuple(float(np.clip(SHARP / max(x, 1e-6), 1, MOST_GAIN)) for x in (-low, high))
-
-    def convexity(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
-        """(P,) as `SurfaceSamples.convexity`, strengthened."""
-        found = self._samples.convexity(points, normals)
-        return (found * np.where(found < 0, *self._gain)).astype(np.float32)
-
-
-def least_like_light(draws: list[Recipe], views: Views, generator: torch.Generator) -> Recipe:
-    """Of several draws of a recipe, the one whose patterns follow the light least. Wide ones do by chance, and pass for it.
-
-    What lies where the surface says, such as moss in crevices, may follow the light; there each coat is judged by itself.
+    What lies where the surface says, such as moss in crevices, may follow the light: each coat is judged by itself.
     """
     chosen = views.seen[:: -(-len(views.seen) // LIT_VIEWS)]
     rows = random_rows(views, chosen, 8 * LIT_POINTS, generator)
@@ -86,15 +31,15 @@ def least_like_light(draws: list[Recipe], views: Views, generator: torch.Generat
     light = torch.cat([_irradiance(views, view, some) for view, some in rows])
     even = spread_evenly(points, LIT_POINTS, views, generator)
     point, normal, irradiance = (t[even].numpy() for t in (points, normals, light))
-    flat = np.zeros(len(point), np.float32)
-    surface = Surface(point, normal, convexity=flat, occlusion=flat)
+    footprint = np.full(len(point), views.pixel_size(), np.float32)
+    surface = views.survey.surface(point, normal, footprint)
 
-    def likeness(recipe: Recipe) -> float:
-        bound = recipe.layout is not None and recipe.layout.kind in BOUND
-        parts = recipe.coats if bound else (recipe,)
-        return max(abs(log_correlation(part.evaluate(surface)[:, :3], irradiance)) for part in parts)
+    def likeness(draw: Recipe) -> float:
+        coats = (Recipe(coat, seed=draw.seed + 7919 * k) for k, coat in enumerate(draw.coats))
+        pieces = views.survey.survey.pieces
+        return max(abs(log_correlation(evaluate(coat, surface, pieces)[:, :3], irradiance)) for coat in coats)
 
-    return min(draws, key=likeness)
+    return min((replace(recipe, seed=recipe.seed * DRAWS + k) for k in range(DRAWS)), key=likeness)
 
 
 def _irradiance(views: Views, view: int, rows: Tensor) -> Tensor:
@@ -128,20 +73,3 @@ def spread_evenly(points: Tensor, count: int, views: Views, generator: torch.Gen
     chance = even_chance(points, 4 * views.pixel_size())
     u = torch.rand(count, generator=generator, dtype=torch.float64)
     return torch.searchsorted(chance, u).clamp(max=len(chance) - 1)
-
-
-def fit(field: MaterialField, start: Start, views: Views, generator: torch.Generator, progress: Progress) -> None:
-    """Bring an untrained field to the start, in place."""
-    device = field.table.device
-    optimizer = RowAdam(dict(field.named_parameters()), tables=frozenset({"table"}))
-    for step in range(STEPS):
-        progress("reading the words", step, STEPS)
-        some = [views.seen[i] for i in torch.randint(len(views.seen), (VIEWS,), generator=generator).tolist()]
-        points, normals = (t.to(device) for t in random_points(views, some, POINTS, generator))
-        wanted = start(points, normals)
-        if step == 0:
-            field.begin_at(wanted.mean(0))
-        found = field(points).columns()
-        (encoded(found) - encoded(wanted)).square().sum(1).mean().backward()
-        optimizer.step(LEARNING_RATE * (1 - step / STEPS))
-    progress("reading the words", STEPS, STEPS)

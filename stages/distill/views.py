@@ -25,6 +25,7 @@ from stages.core.artifact import MANIFEST, load_npz, read_manifest, sha256_file
 from stages.core.errors import ArtifactError
 from stages.core.shading import KNOTS, LIGHT_MAPS, WIDTH, Transport
 from stages.core.views import SD, read_geometry, read_light_maps, read_transport
+from stages.material.survey import Lookup, Survey
 
 CACHE_BYTES = 2 << 30
 """Memory that light transport may take."""
@@ -66,6 +67,7 @@ class Views:
         self.folder = folder
         self.digest = sha256_file(folder / MANIFEST)
         self.prep = provenance.inputs.get("prep", "")
+        self.survey = Lookup(Survey.from_arrays(load_npz(folder / "survey.npz", schemas.SURVEY).arrays))
         self.c2w, self.fov_y = cameras["c2w"], cameras["fov_y"]
         self.width, self.height = int(cameras["width"]), int(cameras["height"])
         self.environments: list[str] = list(provenance.extra["environments"])
@@ -87,8 +89,11 @@ class Views:
 
     def pixel_size(self) -> float:
         """Median width of a pixel at the object, world units."""
-        depth = np.array([np.median(self._geometry[view].depth) for view in self.seen])
-        return float(np.median(2 * depth * np.tan(self.fov_y[self.seen] / 2) / self.height))
+        return float(np.median([self.footprint(view, np.median(self._geometry[view].depth)) for view in self.seen]))
+
+    def footprint(self, view: int, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Width of a pixel of a view at planar depths (P,), world units."""
+        return (2 * depth * np.tan(self.fov_y[view] / 2) / self.height).astype(np.float32)
 
     def surface(self, view: int, rows: NDArray[np.int64]) -> Surface:
         """The points of some object pixels of a view. Args: rows (K,) into `pixels(view)`."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from stages.material.directions import WHOLE, Pieces, along
 from stages.material.patterns import Spectrum, edge, fbm, lost, noise, spots, threshold, warped
 from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
@@ -82,24 +83,23 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
     return fbm(bent, _chance(mask), 7)
 
 
-def settled(recipe: Recipe, surface: Surface, world: Place) -> Recipe:
-    """The recipe with each mask's level set so that it covers its share of this surface.
+def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
+    """The recipe with each mask's level set so that it covers its share of this surface. Args: surface: evenly spread points."""
+    uv, face = along(pieces, surface.piece, surface.point, surface.normal)
+    world = Place(np.ascontiguousarray(surface.point.T), uv, face, surface.footprint, seed=recipe.seed)
 
-    Args:
-        surface: points spread evenly over all of it. world: the same points in object sizes.
-    """
-
-    def settle(mask: Mask, number: int) -> Mask:
+    def settle(mask: Mask, place: Place) -> Mask:
         if mask.kind == "all" or mask.level is not None:
             return mask
-        value = signal(mask, surface, world.seeded(101 + number))
+        value = signal(mask, surface, place)
         share = 1 - mask.share if mask.invert else mask.share
         if mask.kind in ("below", "above", "front", "back"):  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())
             return replace(mask, level=high - share * (high - low))
         return replace(mask, level=float(np.quantile(value, 1 - np.clip(share, 0, 1))))
 
-    def layer(old: Layer, place: int) -> Layer:
-        return replace(old, masks=tuple(settle(mask, number) for number, mask in enumerate(old.masks)))
+    def layer(old: Layer, number: int) -> Layer:
+        at = world.seeded(number)
+        return replace(old, masks=tuple(settle(mask, at.seeded(101 + k)) for k, mask in enumerate(old.masks)))
 
-    return replace(recipe, layers=tuple(layer(old, k) for k, old in enumerate(recipe.layers)))
+    return replace(recipe, layers=tuple(layer(old, number) for number, old in enumerate(recipe.layers, 1)))

@@ -13,6 +13,9 @@ KINDS = (
 )  # fmt: skip
 """Ways to say where a layer lies; see `masks.py`."""
 
+SURVEYED = ("edges", "crevices", "hidden", "chips")
+"""Those of them that ask for what a survey knows."""
+
 
 @dataclass(frozen=True)
 class Coat:
@@ -82,6 +85,11 @@ class Recipe:
         return Recipe(_coat(data["base"]), layers, data["seed"])
 
     @property
+    def follows_surface(self) -> bool:
+        """Whether any mask asks for edges, creases or what is hidden."""
+        return any(mask.kind in SURVEYED for layer in self.layers for mask in layer.masks)
+
+    @property
     def coats(self) -> tuple[Coat, ...]:
         """The base's and each layer's."""
         return (self.base, *(layer.coat for layer in self.layers))
@@ -90,3 +98,7 @@ class Recipe:
 def _coat(data: dict[str, Any]) -> Coat:
     color = data["color"]
     return Coat(**{**data, "color": None if color is None else (color[0], color[1], color[2])})
+
+
+PLAIN = Recipe(Coat("even"))
+"""The same everywhere: where no words are read, all is learnt."""

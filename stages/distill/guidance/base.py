@@ -13,7 +13,7 @@ from torch import Tensor
 
 from stages.distill.guidance.csd import Weights
 from stages.distill.sampling import Sample, Sampler
-from stages.distill.start import Start
+from stages.material.recipe import Recipe
 
 
 @dataclass(frozen=True)
@@ -31,35 +31,34 @@ class Response:
     gradient: (P L, 3) of its loss, scaled to a mean over pixels. loss: a number for the curve. curvature: (P L, 3) second
     derivative of the loss by each value, scaled alike, where the loss is one of least squares: the material is then
     stepped by `stages.distill.gauss_newton`. plain: with a curvature, how far a step takes metallic down and roughness up
-    where the pictures leave them open. expected: (P, 5) sRGB albedo, roughness and metallic that the words alone call for at
-    each point.
+    where the pictures leave them open.
     """
 
     gradient: Tensor
     loss: float
     curvature: Tensor | None = None
     plain: float = 0.0
-    expected: Tensor | None = None
 
 
 class Guidance(Protocol):
     """What an optimisation step asks.
 
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
-    inputs: role -> SHA-256 of the files it was made from. start: from which the field had best begin, or None where it makes
-    no difference. budget: what it calls for where the options leave it open. weights: of its score, or None where it has
-    none.
+    inputs: role -> SHA-256 of the files it was made from. recipe: what the words alone call for, to which a run adds what it
+    learns. held: whether what is learnt is held near to it. budget: what it calls for where the options leave it open. weights: of
+    its score, or None where it has none.
     """
 
     @property
     def sampler(self) -> Sampler: ...
 
     @property
-    def start(self) -> Start | None: ...
+    def recipe(self) -> Recipe: ...
 
     @property
     def weights(self) -> Weights | None: ...
 
+    held: bool
     identity: dict[str, Any]
     inputs: dict[str, str]
     budget: Budget

@@ -2,7 +2,7 @@
 
 Rendered crops and their light maps are exposed alike, put through the model's tone curve, and noised to a random
 diffusion time; the score moves the picture. All three branches (prompt, no prompt, negative prompt) get the same
-conditions, or colours shift. What the words alone call for comes along.
+conditions, or colours shift.
 """
 
 import functools
@@ -17,9 +17,8 @@ from stages.distill.guidance.base import Budget, Response
 from stages.distill.guidance.csd import Weights, chosen_weights, distillation_score
 from stages.distill.guidance.view_words import VIEW_WORDS, words_of
 from stages.distill.options import DistillOptions
-from stages.distill.regularizers import encoded
 from stages.distill.sampling import CropSampler, Images, Sample
-from stages.distill.start import Start
+from stages.material.recipe import Recipe
 from stages.prior.model import Prior
 from stages.prior.text import TextEmbedding
 
@@ -34,9 +33,10 @@ albedo."""
 class PriorGuidance:
     """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size; begin: finds what the words call for."""
 
-    def __init__(self, prior: Prior, sampler: CropSampler, options: DistillOptions, begin: Callable[[], Start]) -> None:
+    def __init__(self, prior: Prior, sampler: CropSampler, options: DistillOptions, begin: Callable[[], Recipe]) -> None:
         self.sampler, self._begin = sampler, begin
         self.identity: dict[str, Any] = prior.identity
+        self.held = True
         self.inputs = {"prior": prior.identity["weights"]}
         self.budget, self.weights = BUDGET, chosen_weights(options, OWN)
         self._prior, self._options = prior, options
@@ -44,7 +44,7 @@ class PriorGuidance:
         self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
 
     @functools.cached_property
-    def start(self) -> Start:
+    def recipe(self) -> Recipe:
         """Found when first asked for: a run that is up to date never does."""
         return self._begin()
 
@@ -64,8 +64,7 @@ class PriorGuidance:
         score = distillation_score(predict, picture.detach(), prior.alpha_bar, self.weights, progress, generator)
         (gradient,) = torch.autograd.grad(picture, leaf, score / len(radiance))
         on_object = images.paint(torch.ones_like(radiance[:, :1]))
-        expected = encoded(self.start(sample.points, sample.normals))
-        return Response(gradient, float((score * on_object).square().mean().sqrt()), expected=expected)
+        return Response(gradient, float((score * on_object).square().mean().sqrt()))
 
     def _conditions(self, images: Images, sample: Sample) -> tuple[Tensor, Tensor]:
         """Exposure (B, 1, 1, 1) and condition channels (B, 23, S, S)."""

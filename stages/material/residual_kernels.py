@@ -1,4 +1,4 @@
-"""Compiled CPU kernels of the hash grid; `stages.core.field.encode_reference` is the plain form of the same.
+"""Compiled CPU kernels of the hash grid; `stages.material.residual.encode_reference` is the plain form of the same.
 
 Levels own disjoint parts of the table, so threads that take whole levels never meet: the sums are formed in one
 order whatever the number of threads. Kernels release the interpreter lock.
@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from stages.core.parallel import run_parallel, slices
 
 POINTS_PER_TASK = 1 << 14
-PRIME_Y, PRIME_Z = np.uint32(2654435761), np.uint32(805459861)  # of stages.core.field.HASH_PRIMES
+PRIME_Y, PRIME_Z = np.uint32(2654435761), np.uint32(805459861)  # of stages.material.residual.HASH_PRIMES
 
 Rows = NDArray[np.int64]
 Values = NDArray[np.float32]
 
 
 def encode(p: Values, table: Values, layout: Rows) -> Values:
-    """Features (levels * 2, N) of points p (N, 3); see `stages.core.field.encode_reference`."""
+    """Features (levels * 2, N) of points p (N, 3); see `stages.material.residual.encode_reference`."""
     out = np.empty((2 * len(layout), len(p)), np.float32)
     parts = slices(len(p), POINTS_PER_TASK)
     run_parallel(_encode, [(p[part], table, layout, out[:, part]) for part in parts])

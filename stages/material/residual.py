@@ -1,14 +1,16 @@
-"""The material field: a multiresolution hash grid and a small network that give a material to every point.
+"""What is learnt on top of a recipe: a multiresolution hash grid and a small network, zero at the start.
+
+material(p) = sigmoid(logit(recipe(p)) + residual(p)) for each of red, green, blue, roughness and metallic: see `combined`.
 
 Sources: Müller et al. 2022, "Instant Neural Graphics Primitives", Section 3 (grid, hash, trilinear look-up);
-Zhang et al. 2024, DreamMat, Section 3.1 (the field's sizes).
+Zhang et al. 2024, DreamMat, Section 3.1 (its sizes).
 
-Points are world points, the object's box [-0.5, 0.5]³. A point outside is clamped to the box: the field is constant
+Points are world points, the object's box [-0.5, 0.5]³. A point outside is clamped to the box: it is constant
 along each axis beyond it, and finite everywhere. Level l divides each axis into `resolution(l)` cells; a level whose
 (resolution + 1)³ corners fit its share of the table is indexed directly, a finer one by Instant-NGP's hash.
 
 `encode_reference` is the plain, differentiable look-up for any device and dtype. On the CPU in float32 the same is done by
-`stages.core.field_kernels`; a test holds the two together.
+`stages.material.residual_kernels`; a test holds the two together.
 """
 
 import math
@@ -20,7 +22,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from stages.core.shading import Material
 
 FEATURES = 2
 """Features per table entry."""
@@ -28,11 +29,8 @@ FEATURES = 2
 OUTPUTS = 5
 """Red, green and blue of the albedo, roughness, metallic."""
 
-START_MARGIN = 0.03
-"""A start is kept this far from 0 and 1, where the sigmoid has no slope left."""
-
-START = (0.27, 0.27, 0.27, 0.55, 0.12)
-"""The material before the first step: a dark dielectric, from which metals and dielectrics both are reached."""
+MARGIN = 0.03
+"""A recipe's values are kept this far from 0 and 1 before the logit, where the sigmoid has no slope left to learn by."""
 
 TABLE_SPREAD = 1e-4
 """Table entries start uniform in ± this. Source: Müller et al. 2022, Section 4."""
@@ -42,8 +40,8 @@ HASH_PRIMES = (1, 2654435761, 805459861)
 
 
 @dataclass(frozen=True)
-class FieldConfig:
-    """Sizes of the field; the defaults are the paper's.
+class ResidualConfig:
+    """Sizes of the residual; the defaults are the paper's.
 
     levels: grids, coarse to fine. log2_entries: most table entries of a level, as a power of two. base: cells along an
     axis of the coarsest level. growth: ratio of cells between levels. hidden: width of the network's one hidden layer.
@@ -56,11 +54,11 @@ class FieldConfig:
     hidden: int = 64
 
     @staticmethod
-    def for_detail(spacing: float) -> "FieldConfig":
-        """The paper's field with just enough levels that the finest cell is no longer than `spacing` (world units)."""
-        paper = FieldConfig()
+    def for_detail(spacing: float) -> "ResidualConfig":
+        """The paper's sizes with just enough levels that the finest cell is no longer than `spacing` (world units)."""
+        paper = ResidualConfig()
         wanted = math.log(max(1.0 / (spacing * paper.base), 1.0)) / math.log(paper.growth)
-        return FieldConfig(levels=min(1 + math.ceil(wanted), paper.levels))
+        return ResidualConfig(levels=min(1 + math.ceil(wanted), paper.levels))
 
     def resolution(self, level: int) -> int:
         """Cells along one axis of a level."""
@@ -77,14 +75,14 @@ class FieldConfig:
         return np.stack([[self.resolution(level) for level in range(self.levels)], starts, counts], 1).astype(np.int64)
 
 
-class MaterialField(nn.Module):
-    """Material of any point; parameters are float32 and start from `generator`.
+class Residual(nn.Module):
+    """Logits to add at any point, next to 0 before the first step; parameters are float32 and start from `generator`.
 
-    Differentiable in: its parameters. The table's gradient is a coalesced sparse tensor on the CPU path: call the field
+    Differentiable in: its parameters. The table's gradient is a coalesced sparse tensor on the CPU path: call it
     once per step, on all points together. Not differentiable in the points on that path (see `encode_reference`).
     """
 
-    def __init__(self, config: FieldConfig, generator: torch.Generator) -> None:
+    def __init__(self, config: ResidualConfig, generator: torch.Generator) -> None:
         super().__init__()
         self.config = config
         self._layout = config.layout()
@@ -93,18 +91,12 @@ class MaterialField(nn.Module):
         self.weights_0 = nn.Parameter(_uniform((config.hidden, inputs), math.sqrt(6 / inputs), generator))
         self.bias_0 = nn.Parameter(torch.zeros(config.hidden))
         self.weights_1 = nn.Parameter(_uniform((OUTPUTS, config.hidden), math.sqrt(3 / config.hidden), generator))
-        self.bias_1 = nn.Parameter(torch.logit(torch.tensor(START)))
+        self.bias_1 = nn.Parameter(torch.zeros(OUTPUTS))
 
-    def begin_at(self, material: Tensor) -> None:
-        """Make the untrained field this material everywhere. Args: (5,) linear albedo, roughness, metallic."""
-        with torch.no_grad():
-            self.bias_1.copy_(torch.logit(material.to(self.bias_1), eps=START_MARGIN))
-
-    def forward(self, p: Tensor) -> Material:
-        """Material of points p (N, 3), world."""
+    def forward(self, p: Tensor) -> Tensor:
+        """Logits (N, 5) to add at points p (N, 3), world."""
         hidden = torch.relu(torch.addmm(self.bias_0[:, None], self.weights_0, self._encode(p)))
-        out = torch.sigmoid(torch.addmm(self.bias_1[:, None], self.weights_1, hidden))  # (5, N)
-        return Material(out[:3].T, out[3], out[4])
+        return torch.addmm(self.bias_1[:, None], self.weights_1, hidden).T
 
     def _encode(self, p: Tensor) -> Tensor:
         if p.device.type == "cpu" and self.table.dtype == torch.float32:
@@ -116,19 +108,32 @@ class MaterialField(nn.Module):
         return {name: value.detach().cpu().numpy().copy() for name, value in self.named_parameters()}
 
     @staticmethod
-    def from_arrays(config: dict[str, Any], arrays: dict[str, NDArray]) -> "MaterialField":
-        """The field that `to_arrays` wrote. Args: config: FieldConfig as a dict. Raises: ValueError if they disagree."""
-        field = MaterialField(FieldConfig(**config), torch.Generator())
+    def from_arrays(config: dict[str, Any], arrays: dict[str, NDArray]) -> "Residual":
+        """The residual that `to_arrays` wrote. Args: config: ResidualConfig as a dict. Raises: ValueError if they disagree."""
+        made = Residual(ResidualConfig(**config), torch.Generator())
         with torch.no_grad():
-            for name, parameter in field.named_parameters():
+            for name, parameter in made.named_parameters():
                 if arrays[name].shape != tuple(parameter.shape):
                     raise ValueError(f"'{name}' is {arrays[name].shape}, expected {tuple(parameter.shape)}")
                 parameter.copy_(torch.from_numpy(arrays[name]))
-        return field
+        return made
 
     def config_dict(self) -> dict[str, Any]:
-        """FieldConfig as JSON types."""
+        """ResidualConfig as JSON types."""
         return asdict(self.config)
+
+
+def combined(base: Tensor, residual: Tensor) -> Tensor:
+    """A recipe's material and what was learnt on top: exactly the recipe where the residual is 0.
+
+    Args:
+        base: (P, 5) linear albedo, roughness and metallic in [0, 1]. residual: (P, 5) logits.
+    Returns:
+        (P, 5) in [0, 1]. Differentiable in: residual.
+    """
+    inside = base.clamp(MARGIN, 1 - MARGIN)
+    moved = base + torch.sigmoid(torch.logit(inside) + residual) - inside
+    return moved + (moved.clamp(0.0, 1.0) - moved).detach()  # its slope is kept beyond the ends, so that it finds back
 
 
 def _uniform(shape: tuple[int, ...], limit: float, generator: torch.Generator) -> Tensor:
@@ -139,7 +144,7 @@ def encode_reference(p: Tensor, table: Tensor, layout: NDArray[np.int64]) -> Ten
     """Features of points: at each level the trilinear mean of the eight corners of the cell a point lies in.
 
     Args:
-        p: (N, 3) world, clamped to the box. table: (T, 2). layout: of `FieldConfig.layout`.
+        p: (N, 3) world, clamped to the box. table: (T, 2). layout: of `ResidualConfig.layout`.
     Returns:
         (levels * 2, N), coarse to fine. Differentiable in: table; p, where inside the box and not on a cell border.
     """
@@ -171,18 +176,18 @@ class _KernelEncoding(torch.autograd.Function):
 
     @staticmethod
     def forward(ctx: Any, p: Tensor, table: Tensor, layout: NDArray[np.int64]) -> Tensor:  # type: ignore[override]
-        from stages.core import field_kernels  # compiled code is loaded on first use
+        from stages.material import residual_kernels  # compiled code is loaded on first use
 
         ctx.save_for_backward(p, table)
         ctx.layout = layout
-        return torch.from_numpy(field_kernels.encode(p.detach().numpy(), table.detach().numpy(), layout))
+        return torch.from_numpy(residual_kernels.encode(p.detach().numpy(), table.detach().numpy(), layout))
 
     @staticmethod
     def backward(ctx: Any, gradient: Tensor) -> tuple[None, Tensor, None]:  # type: ignore[override]
-        from stages.core import field_kernels
+        from stages.material import residual_kernels
 
         p, table = ctx.saved_tensors
-        rows, values = field_kernels.encode_backward(p.detach().numpy(), gradient.contiguous().numpy(), ctx.layout)
+        rows, values = residual_kernels.encode_backward(p.detach().numpy(), gradient.contiguous().numpy(), ctx.layout)
         sparse = torch.sparse_coo_tensor(
             torch.from_numpy(rows)[None], torch.from_numpy(values), table.shape, is_coalesced=True, check_invariants=False
         )
