@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.train.colors import COLORS, rgb
-from stages.train.substances import FINISHES, FINISHES_METAL, SUBSTANCES
+from stages.prior.colors import COLORS, rgb
+from stages.prior.names import FINISHES, FINISHES_METAL, SUBSTANCES
 
 
 @dataclass(frozen=True)

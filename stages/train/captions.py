@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from numpy.random import Generator
 
-from stages.train.substances import OBJECTS
+from stages.prior.names import OBJECTS
 
 
 @dataclass(frozen=True)

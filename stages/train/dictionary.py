@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from stages.train.colors import CHANGES, COLORS, LEANINGS
+from stages.prior.colors import CHANGES, COLORS, LEANINGS
 
 PARTS, INDEX = ("data.noun", "data.adj"), "index.noun"
 """Files of WordNet that are read: meanings, and every noun's, the most frequent first."""

@@ -8,8 +8,8 @@ from stages.prior.patterns import PATTERNS
 from stages.prior.recipe import LAYOUTS
 from stages.prior.text import MAX_WORDS, Reading, TextEmbedding, TextEncoder, Vocabulary, split_words
 from stages.train.captions import template_words
-from stages.train.colors import COLORS
-from stages.train.substances import OBJECTS, SUBSTANCES
+from stages.prior.colors import COLORS
+from stages.prior.names import OBJECTS, SUBSTANCES
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
-from stages.train.colors import CHANGES, COLORS, COMMON, LEANINGS, RARE, draw_named, named
+from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS, RARE, draw_named, named
 
 
 def test_names_are_drawn_with_what_they_mean() -> None:
