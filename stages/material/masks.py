@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.material.directions import WHOLE, Pieces, along
-from stages.material.patterns import Spectrum, edge, fbm, lost, noise, spots, threshold, warped
+from stages.material.patterns import Spectrum, edge, exceeds, fbm, lost, noise, spots, warped
 from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
 from stages.material.surface import Array, Surface
@@ -32,7 +32,7 @@ def coverage(masks: tuple[Mask, ...], surface: Surface, world: Place) -> Array:
 
 
 def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
-    level = np.float32(0.0 if mask.level is None else mask.level)
+    level = 0.0 if mask.level is None else mask.level
     value = signal(mask, surface, at)
     if mask.kind in DISTANCES:
         rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.75)
@@ -42,10 +42,10 @@ def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
         soft = np.maximum(0.5 * at.footprint, 1.2 * ragged * lost(at, rough)) if mask.wear else 0.5 * at.footprint
         return edge(value - level, 2 * soft)
     if mask.kind in CHANCE:
-        return threshold(value, level, 0.06 + 1.2 * lost(at, _chance(mask)))
+        return exceeds(value, level, 0.06, lost(at, _chance(mask)))
     rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.9, patch=0.4)
     amount = 0.04 + 0.16 * mask.wear
-    return threshold(value + amount * fbm(at, rough, 5), level, 0.02 + 1.2 * amount * lost(at, rough))
+    return exceeds(value + amount * fbm(at, rough, 5), level, 0.02, amount * lost(at, rough))
 
 
 def _chance(mask: Mask) -> Spectrum:

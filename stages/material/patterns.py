@@ -108,15 +108,21 @@ def lost(at: Place, spectrum: Spectrum) -> Array:
 
 
 def threshold(x: Array, level: Array | float, softness: Array | float) -> Array:
-    """Share of x above a level: 0 to 1 over `softness` on either side. Add `lost` to the softness of noise. Returns: (P,)."""
+    """Share of x above a level: 0 to 1 over `softness` on either side. For noise see `exceeds`. Returns: (P,)."""
     t = np.clip((x - level) / (2 * np.maximum(softness, 1e-4)) + 0.5, 0, 1)
     return (t * t * (3 - 2 * t)).astype(np.float32)
+
+
+def exceeds(x: Array, level: float, softness: float, hidden: Array) -> Array:
+    """Share of noise above a level, of which a part of deviation `hidden` cannot be seen. softness: of the border. Returns: (P,)."""
+    steepness = np.float32(1.702) / np.hypot(np.float32(max(0.6 * softness, 1e-3)), hidden)  # the logistic curve next to the normal one
+    return (1 / (1 + np.exp(np.clip((level - x) * steepness, -40, 40)))).astype(np.float32)
 
 
 def masked(at: Place, spectrum: Spectrum, share: float, seed: int = 0, softness: float = 0.05) -> Array:
     """A mask with noisy borders that covers a share of everything; the share stays where the footprint hides the noise."""
     level = NormalDist().inv_cdf(1 - min(max(share, 1e-4), 1 - 1e-4))
-    return threshold(fbm(at, spectrum, seed), level, softness + 1.2 * lost(at, spectrum))
+    return exceeds(fbm(at, spectrum, seed), level, softness, lost(at, spectrum))
 
 
 def edge(distance: Array, footprint: Array) -> Array:

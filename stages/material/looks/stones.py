@@ -35,10 +35,10 @@ def marble(at: Place) -> Look:
     strong = np.exp(-wide / 0.035) + 0.5 * np.exp(-wide / 0.25)
     hair = np.exp(-thin / np.maximum(0.02, 0.05 * where)) * where
     cloud = fbm(bent, Spectrum(0.2, 0.005, 0.75), 7)
-    grain = fbm(at, Spectrum(0.003, 0.0004, 1.05, tails=0.3, patch=0.4), 8)
+    grain = fbm(at, Spectrum(0.006, 0.0002, 1.15, tails=0.3, patch=0.4), 8)
     depth = 0.75 * strong * where + 0.55 * hair + 0.05 * np.clip(cloud, 0, 3)
     color = palette(depth, "#e9e7e3", "#d3d1cd", "#9b9a98", "#63615f")
-    color = tint(shade(color, 0.035 * grain - 0.03 * abs(cloud)), 0.05 * noise(bent, 0.1, 9))
+    color = tint(shade(color, 0.05 * grain - 0.03 * abs(cloud)), 0.05 * noise(bent, 0.1, 9))
     return Look(color, 0.16 + 0.12 * np.clip(depth, 0, 1) + 0.02 * grain, 0.0, 6e-6 * grain - 3e-5 * hair)
 
 

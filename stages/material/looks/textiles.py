@@ -20,7 +20,7 @@ def denim(at: Place) -> Look:
     lit = 0.75 * (cloth.height - 0.62) * cloth.seen
     warp = cloth.warp * cloth.seen + (1 - cloth.seen) * 0.67
     color = mix(undyed, indigo, warp * 0.9 + 0.08)
-    color = shade(color, lit - 0.7 * cloth.gap * cloth.seen + 0.10 * fuzz)
+    color = shade(color, lit - 0.7 * cloth.gap * cloth.seen + 0.16 * (1 - cloth.seen) + 0.10 * fuzz)
     return Look(color, 0.9 + 0.05 * fuzz, 0.0, 2.2e-4 * cloth.height * cloth.seen + 2e-5 * fuzz)
 
 

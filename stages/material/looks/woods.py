@@ -55,9 +55,9 @@ def timber(at: Place, kind: Timber) -> Look:
 def boards(at: Place, kind: Timber, width: float = 0.12, length: float = 1.2) -> Look:
     """Boards side by side, each cut elsewhere, a dark joint between them."""
     bond = tiles(at.swapped(), length, width, "random", 11)
-    shift = np.stack([bond.random(1) * 0.3, bond.random(2) * 3, bond.random(3) * 0.2]).astype(np.float32)
-    p = np.stack([at.uv[0], at.uv[1], 0 * at.uv[0]])
-    look = timber(Place(p + shift, at.uv, at.face, at.footprint, (0.0, at.period[1], 0.0), at.seed), kind)
+    shift = np.stack([bond.random(1) * 0.3 - 0.15, bond.random(2) * 3, bond.random(3) * 0.2]).astype(np.float32)
+    own = np.stack([bond.y, bond.x, 0 * bond.x]) + shift
+    look = timber(Place(own, at.uv, at.face, at.footprint, seed=at.seed), kind)
     worn = bond.border + 0.0006 * noise(at.flat, 0.01, 12)
     gap = 1 - threshold(worn, 0.001, np.maximum(0.0005, 0.5 * at.footprint))
     color = shade(look.color, 0.25 * (bond.random(4) - 0.5) - 1.6 * gap)
