@@ -29,9 +29,11 @@ def save_prep(path: Path, vertices: NDArray, triangles: NDArray, normals: NDArra
         "loop_source_uv": np.full(3 * count, -1, np.int32),
         "loop_source_normal": np.full(3 * count, -1, np.int32),
         "face_part": np.zeros(count, np.int32),
+        "face_group": np.full(count, -1, np.int32),
         "loop_uv": np.zeros((3 * count, 2), np.float32),
     }
     part = {"name": "mesh", "material": "material", "node": "mesh", "transform": np.eye(4).ravel().tolist()}
-    extra = {"source_format": "obj", "source_name": "mesh", "uv_kept": False, "parts": [part], "findings": {}}
+    extra = {"source_format": "obj", "source_name": "mesh", "uv_kept": False, "parts": [part], "groups": []}
+    extra["findings"] = {}
     save_npz(path, PREP, arrays, Provenance({}, None, {"mesh": seed or "0" * 64}, extra))
     return path

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.asset.gltf import write_glb
+from stages.asset.model import source_model
+from stages.asset.textures import write_textures
+from stages.asset.wavefront import write_obj
 from stages.bake.fill import fill_unseen, pad
-from stages.bake.gltf import write_glb
 from stages.bake.options import BakeOptions
 from stages.bake.preview import contact_sheet
 from stages.bake.raster import Layout, Surface, touched_texels
-from stages.bake.source import source_model
 from stages.bake.texels import bake_texels
-from stages.bake.textures import write_textures
 from stages.bake.visibility import Views, is_open, patches, seen_points
-from stages.bake.wavefront import write_obj
 from stages.core.artifact import (
     Artifact,
     Provenance,

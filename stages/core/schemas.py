@@ -7,7 +7,7 @@ from stages.core.artifact import Field, Schema
 
 PREP = Schema(
     "dreammat.prep",
-    1,
+    2,
     {
         # the working mesh: normalised world frame, welded, outward, triangles
         "vertices": Field("f4", ("V", 3)),
@@ -26,11 +26,13 @@ PREP = Schema(
         "loop_source_uv": Field("i4", ("L",)),  # row of source_uv, or -1
         "loop_source_normal": Field("i4", ("L",)),  # row of source_normals, or -1
         "face_part": Field("i4", ("P",)),  # entry of extra["parts"]
+        "face_group": Field("i4", ("P",)),  # entry of extra["groups"], or -1
         "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, [0, 1], v up
     },
     # source_format: "obj" | "ply" | "stl" | "off" | "glb"; uv_kept: bool; findings: what was found and mended;
     # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row)}
-    extra=("source_format", "source_name", "uv_kept", "parts", "findings"),
+    # groups: names of an OBJ's groups
+    extra=("source_format", "source_name", "uv_kept", "parts", "groups", "findings"),
 )
 
 CAMERAS = Schema(

@@ -33,7 +33,8 @@ class Source:
     vertices: (SV, 3) float64 as in the file. uv: (ST, 2) float64. normals: (SN, 3) float32.
     loop_start: (P + 1,) int32; face p has loops loop_start[p] .. loop_start[p + 1] - 1.
     loop_vertex, loop_uv, loop_normal: (L,) int32 rows of the above; -1 where a loop has no UV or normal.
-    face_part: (P,) int32 rows of parts. v_down: whether v = 0 is the top of the image.
+    face_part: (P,) int32 rows of parts. face_group: (P,) int32 rows of groups (an OBJ's `g`), or -1.
+    v_down: whether v = 0 is the top of the image.
     skipped: what the file holds besides triangles and polygons, with its count.
     """
 
@@ -49,6 +50,8 @@ class Source:
     parts: list[Part]
     v_down: bool = False
     skipped: dict[str, int] = field(default_factory=dict)
+    face_group: NDArray[np.int32] | None = None
+    groups: list[str] = field(default_factory=list)
 
     def placed_vertices(self) -> NDArray[np.float64]:
         """(SV, 3) vertices with node transforms applied; an unreferenced vertex stays as it is."""

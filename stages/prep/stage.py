@@ -70,6 +70,7 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
             "source_name": mesh.name,
             "uv_kept": kept,
             "parts": [asdict(part) for part in source.parts],
+            "groups": source.groups,
             "findings": findings,
         }
         arrays = _arrays(source, working, normals, uv, chart, loop_uv)
@@ -165,6 +166,10 @@ def _texel_density(working: Working, uv: NDArray, texture_size: int) -> float:
     return round(texture_size * float(np.sqrt(np.abs(signed_area(uv)).sum() / area.sum())), 3)
 
 
+def _no_groups(source: Source) -> NDArray[np.int32]:
+    return np.full(len(source.face_part), -1, np.int32)
+
+
 def _arrays(
     source: Source, working: Working, normals: NDArray, uv: NDArray, chart: NDArray, loop_uv: NDArray
 ) -> dict[str, NDArray]:
@@ -184,5 +189,6 @@ def _arrays(
         "loop_source_uv": source.loop_uv,
         "loop_source_normal": source.loop_normal,
         "face_part": source.face_part,
+        "face_group": _no_groups(source) if source.face_group is None else source.face_group,
         "loop_uv": loop_uv,
     }

@@ -6,16 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stages.asset.textures import srgb_8bit
 from stages.bake import stage
 from stages.bake.options import BakeOptions
 from stages.bake.preview import bilinear
 from stages.bake.stage import bake
-from stages.bake.textures import srgb_8bit
 from stages.core.artifact import read_exr, read_manifest, sha256_file
 from stages.core.color import srgb_encode
 from stages.core.errors import ArtifactError, InputError, OutputError
 from stages.core.images import read_image
 from stages.core.schemas import ASSET
+from tests.asset.glb import Glb
 from tests.bake.examples import (
     constant_field,
     cube,
@@ -25,7 +26,6 @@ from tests.bake.examples import (
     save_prep,
     small_field,
 )
-from tests.bake.glb import Glb
 from tests.conftest import Golden
 
 SMALL = BakeOptions(size=512, supersample=1, preview_size=32)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.source import Model, Part
+from stages.asset.model import Model, Part
 from stages.core.artifact import written_atomically
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
@@ -145,8 +145,7 @@ def _columns(matrix: NDArray[np.float64]) -> list[float]:
 
 def _primitive(part: Part, materials: list[str], buffer: _Buffer) -> dict[str, Any]:
     attributes = {"POSITION": buffer.accessor(part.positions, "VEC3", ARRAY, bounds=True)}
-    if part.normals is not None:
-        attributes["NORMAL"] = buffer.accessor(part.normals, "VEC3", ARRAY)
+    attributes["NORMAL"] = buffer.accessor(part.normals, "VEC3", ARRAY)
     attributes["TEXCOORD_0"] = buffer.accessor(part.uv, "VEC2", ARRAY)
     small = len(part.positions) <= 65535  # the index 65535 itself means "restart"
     indices = part.triangles.reshape(-1).astype(np.uint16 if small else np.uint32)
