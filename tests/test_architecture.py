@@ -14,7 +14,7 @@ ALLOWED = {
     "prior": {"core"},
     "sd": {"core"},
     "prep": {"core", "light", "prior"},
-    "conditions": {"core", "light", "prior"},
+    "conditions": {"core", "light", "prior", "asset"},
     "distill": {"core", "light", "prior", "sd"},
     "bake": {"core", "light", "prior", "asset"},
     "train": {"core", "light", "prior", "sd", "asset", "prep", "conditions", "distill", "bake"},

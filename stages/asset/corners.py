@@ -1,8 +1,9 @@
-"""What each corner of the source carries into a file: UV and normal, in its part's own frame.
+"""What each corner of the source carries into a file: UV, normal and tangent, in its part's own frame.
 
 A *loop* is one corner of one face of the source, in the order of the file (Blender's word).
 """
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import Artifact
 from stages.core.polygons import triangulate
+from stages.core.tangents import mikktspace
 
 UNIT_TOLERANCE = 5e-3
 """A source normal whose length is within this of 1 keeps its bits; the glTF validator allows 6.7e-3."""
@@ -131,6 +133,45 @@ def vertex_or_face_normals(prep: Artifact, normals: NDArray[np.float32], loops: 
     result = np.where((at_vertex >= 0)[:, None], there, flat[loops])
     result[(result == 0).all(1)] = (0, 0, 1)
     return (result + 0.0).astype(np.float32)
+
+
+# ---------------------------------------------------------------------------------------------------- tangents
+
+
+def loop_tangents(
+    prep: Artifact, normals: NDArray[np.float32], uv: NDArray[np.float32], parts: Collection[int]
+) -> NDArray[np.float32]:
+    """Tangent of each loop of some parts, by which their normal maps are read: the source's own, else MikkTSpace's.
+
+    Args:
+        normals: (L, 3) in the part's frame. uv: (L, 2), v down. parts: numbers of the parts.
+    Returns:
+        (L, 4), glTF's TANGENT; (1, 0, 0, 1) for loops of other parts.
+    """
+    triangles, face = source_triangles(prep)
+    position = prep["source_vertices"].astype(np.float32)[prep["loop_vertex"]]
+    triangles_part = prep["face_part"][face]
+    sound = np.isfinite(position[triangles]).all((1, 2))
+    tangents = np.zeros((len(uv), 4), np.float32)
+    tangents[:] = (1, 0, 0, 1)
+    for part in parts:
+        mine = triangles[sound & (triangles_part == part)]
+        tangents[mine] = mikktspace(position[mine], normals[mine], uv[mine] * np.array([1, -1], np.float32))
+    own, has_own = authored_tangents(prep)
+    has_own &= np.isin(loop_parts(prep), list(parts))
+    tangents[has_own] = own[has_own]
+    return tangents
+
+
+def authored_tangents(prep: Artifact) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """The source's tangents where its UVs were kept. Returns: (L, 4); (L,) whether a loop has a sound one."""
+    row, table = prep["loop_source_tangent"], prep["source_tangents"]
+    if not keeps_gltf_uv(prep) or not (row >= 0).any():
+        return np.zeros((len(row), 4), np.float32), np.zeros(len(row), bool)
+    with np.errstate(invalid="ignore", over="ignore"):
+        length = np.linalg.norm(table[:, :3].astype(np.float64), axis=1)
+    sound = (np.abs(length - 1) <= UNIT_TOLERANCE) & (np.abs(table[:, 3]) == 1)
+    return table[row], (row >= 0) & sound[row]
 
 
 def unit(vectors: NDArray) -> NDArray[np.float64]:

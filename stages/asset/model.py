@@ -3,6 +3,7 @@
 Per corner, positions, UVs and face order are the source's, bit for bit; a polygon becomes the triangles that were traced.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +16,7 @@ from stages.asset.corners import (
     keeps_gltf_uv,
     loop_normals,
     loop_parts,
+    loop_tangents,
     source_triangles,
     transform_of,
 )
@@ -25,13 +27,16 @@ from stages.core.frames import Y_UP_TO_WORLD
 ANY_NORMAL = np.array([0, 0, 1], np.float32)
 """Of a vertex that no face uses."""
 
+ANY_TANGENT = np.array([1, 0, 0, 1], np.float32)
+"""Likewise."""
+
 
 @dataclass(frozen=True)
 class Part:
     """One material slot of one node.
 
-    transform: (4, 4) local to source frame. positions, normals: (N, 3) float32, local. uv: (N, 2), v down.
-    triangles: (T, 3) uint32. Parts that share a vertex table share its arrays.
+    transform: (4, 4) local to source frame. positions, normals: (N, 3) float32, local. uv: (N, 2), v down. tangents:
+    (N, 4), or None without a normal map. triangles: (T, 3) uint32. Parts that share a vertex table share its arrays.
     """
 
     name: str
@@ -41,6 +46,7 @@ class Part:
     positions: NDArray[np.float32]
     normals: NDArray[np.float32]
     uv: NDArray[np.float32]
+    tangents: NDArray[np.float32] | None
     triangles: NDArray[np.uint32]
 
 
@@ -54,11 +60,18 @@ class Model:
     notes: dict[str, int] = field(default_factory=dict)
 
 
-def source_model(prep: Artifact, double_sided: bool) -> Model:
-    """Build the model from prep.npz. Args: double_sided: whether backs are meant to be seen."""
+def source_model(prep: Artifact, double_sided: bool, normal_mapped: Collection[str] = ()) -> Model:
+    """Build the model from prep.npz.
+
+    Args:
+        double_sided: whether backs are meant to be seen. normal_mapped: names of the materials that have a normal map.
+    """
     notes: dict[str, int] = {}
     positions = finite_positions(prep["source_vertices"], notes)
     uv, normals = gltf_uv(prep), loop_normals(prep)
+    infos = prep.provenance.extra["parts"]
+    bumpy = {number for number, info in enumerate(infos) if info["material"] in normal_mapped}
+    tangents = loop_tangents(prep, normals, uv, bumpy) if bumpy else None
     triangles, face = source_triangles(prep)
     usable = ~np.isin(prep["loop_vertex"][triangles], unusable_vertices(prep["source_vertices"])).any(1)
     if not usable.all():
@@ -67,19 +80,24 @@ def source_model(prep: Artifact, double_sided: bool) -> Model:
     parts: dict[int, Part] = {}
     for numbers, start, stop in vertex_runs(prep):
         loops = np.flatnonzero(np.isin(loop_parts(prep), numbers))
-        table = split_vertices(prep["loop_vertex"], loops, [uv, normals], start, stop)
+        kinds = [uv, normals] if tangents is None else [uv, normals, tangents]
+        table = split_vertices(prep["loop_vertex"], loops, kinds, start, stop)
         spare = spare_uv(prep, table, loops)
         arrays = positions[table.source], table.values(normals, ANY_NORMAL), table.values(uv, spare)
+        frames = None if tangents is None else table.values(tangents, ANY_TANGENT)
         for number in numbers:
             indices = table.of_loop[triangles[part == number]].astype(np.uint32)
-            parts[number] = _part(prep.provenance.extra["parts"][number], arrays, indices)
+            parts[number] = _part(infos[number], arrays, frames if number in bumpy else None, indices)
     in_order = [parts[number] for number in sorted(parts) if len(parts[number].triangles)]
     return Model(in_order, upright(prep["to_world"]), double_sided or bool(flipped_loops(prep).any()), notes)
 
 
-def _part(info: dict[str, Any], arrays: tuple[NDArray, NDArray, NDArray], triangles: NDArray) -> Part:
+def _part(
+    info: dict[str, Any], arrays: tuple[NDArray, NDArray, NDArray], tangents: NDArray | None, triangles: NDArray
+) -> Part:
     name = str(info["name"] or "mesh")
-    return Part(name, str(info["material"] or ""), str(info["node"] or name), transform_of(info), *arrays, triangles)
+    node = str(info["node"] or name)
+    return Part(name, str(info["material"] or ""), node, transform_of(info), *arrays, tangents, triangles)
 
 
 def vertex_runs(prep: Artifact) -> list[tuple[list[int], int, int]]:

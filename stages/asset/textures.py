@@ -1,8 +1,10 @@
 """The texture files: EXR masters and 8-bit PNGs.
 
-Masters are half float, linear: values lie in [0, 1], where a half is off by at most 2.5e-4, a sixteenth of an 8-bit
-step, at half the bytes and time of float32. A one-channel EXR is "Y", OpenEXR's name for grey.
-glTF conventions: albedo.png is sRGB; orm.png is linear, R occlusion (1: none is baked), G roughness, B metallic.
+Masters are half float, linear: values lie in [-1, 1], where a half is off by at most 2.5e-4, a sixteenth of an 8-bit
+step, at half the bytes and time of float32. Heights are float32, since they are differentiated. A one-channel EXR is
+"Y", OpenEXR's name for grey.
+glTF conventions: albedo.png is sRGB; orm.png is linear, R occlusion (1 where none is baked), G roughness, B metallic;
+normal.png is linear, (n + 1) / 2, +Y up.
 """
 
 from collections.abc import Callable
@@ -11,13 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.asset.maps import Maps
 from stages.core.artifact import write_exr
 from stages.core.color import srgb_decode
 from stages.core.images import write_png
 from stages.core.jit import in_parallel
-
-MASTERS = {"albedo.exr": {"R": 0, "G": 1, "B": 2}, "roughness.exr": {"Y": 3}, "metallic.exr": {"Y": 4}}
-"""File -> EXR channel -> index in the baked maps."""
 
 PNG_LEVEL = 3
 """zlib's level: within 2 % of the bytes of level 6, in two thirds of the time."""
@@ -40,35 +40,78 @@ def srgb_8bit(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
     return byte + (linear >= borders[byte])
 
 
-def write_textures(folder: Path, maps: NDArray[np.float32], grey: bool) -> list[str]:
-    """Write masters and PNGs, several at a time.
+def normal_8bit(normal: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Unit vectors (H, W, 3) to bytes, dithered by at most half a step so that gentle slopes do not turn into terraces.
+
+    Where nothing leans, the bytes are those that every tool takes for flat: 128, 128, 255.
+    """
+    noise = np.random.default_rng(0).random(normal.shape, np.float32)
+    byte = np.clip((normal + 1) * np.float32(127.5) + noise, 0, 255).astype(np.uint8)
+    byte[(normal[..., :2] == 0).all(-1)] = (128, 128, 255)
+    return byte
+
+
+def write_textures(folder: Path, maps: Maps, grey: bool) -> list[str]:
+    """Write the masters and PNGs of the maps there are, several at a time.
 
     Args:
-        maps: (H, W, 5) albedo, roughness, metallic. grey: also roughness.png and metallic.png, which MTL asks for.
+        grey: also roughness.png and metallic.png, which MTL asks for.
     Returns:
         the files' names.
     """
+    pngs, exrs = pictures(maps, grey), masters(maps)
 
-    def master(name: str) -> Callable[[], None]:
-        return lambda: write_exr(folder / name, {c: maps[..., k].astype(np.float16) for c, k in MASTERS[name].items()})
+    def write(name: str) -> None:
+        if name in pngs:
+            write_png(folder / name, pngs[name](), PNG_LEVEL)
+        else:
+            write_exr(folder / name, exrs[name]())
 
-    def picture(name: str, make: Callable[[], NDArray[np.uint8]]) -> Callable[[], None]:
-        return lambda: write_png(folder / name, make(), PNG_LEVEL)
+    names = [*pngs, *exrs]
+    in_parallel(write, names)
+    return names
 
-    jobs = {
-        "albedo.png": picture("albedo.png", lambda: srgb_8bit(maps[..., :3])),
-        "orm.png": picture("orm.png", lambda: orm(maps)),
-        **{name: master(name) for name in MASTERS},
+
+def pictures(maps: Maps, grey: bool) -> dict[str, Callable[[], NDArray[np.uint8]]]:
+    """PNG by name, made when called."""
+    made: dict[str, Callable[[], NDArray[np.uint8]]] = {
+        "albedo.png": lambda: srgb_8bit(maps.albedo),
+        "orm.png": lambda: orm(maps),
     }
+    normal = maps.normal
+    if normal is not None:
+        made["normal.png"] = lambda: normal_8bit(normal)
     if grey:
-        jobs["roughness.png"] = picture("roughness.png", lambda: to_8bit(maps[..., 3]))
-        jobs["metallic.png"] = picture("metallic.png", lambda: to_8bit(maps[..., 4]))
-    in_parallel(lambda job: job(), jobs.values())
-    return list(jobs)
+        made |= {"roughness.png": lambda: to_8bit(maps.roughness), "metallic.png": lambda: to_8bit(maps.metallic)}
+    return made
 
 
-def orm(maps: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """glTF's packed texture. Args: maps (H, W, 5). Returns: (H, W, 3)."""
-    packed = np.full((*maps.shape[:2], 3), 255, np.uint8)
-    packed[..., 1:] = to_8bit(maps[..., 3:])
+def masters(maps: Maps) -> dict[str, Callable[[], dict[str, NDArray]]]:
+    """Channels of each EXR by name, made when called."""
+    made = {"albedo.exr": lambda: _colour(maps.albedo), "roughness.exr": lambda: _grey(maps.roughness)}
+    made["metallic.exr"] = lambda: _grey(maps.metallic)
+    normal, height, occlusion = maps.normal, maps.height, maps.occlusion
+    if normal is not None:
+        made["normal.exr"] = lambda: _colour(normal)
+    if occlusion is not None:
+        made["occlusion.exr"] = lambda: _grey(occlusion)
+    if height is not None:
+        made["height.exr"] = lambda: {"Y": height}
+    return made
+
+
+def _colour(values: NDArray) -> dict[str, NDArray]:
+    return {channel: values[..., k].astype(np.float16) for k, channel in enumerate("RGB")}
+
+
+def _grey(values: NDArray) -> dict[str, NDArray]:
+    return {"Y": values.astype(np.float16)}
+
+
+def orm(maps: Maps) -> NDArray[np.uint8]:
+    """glTF's packed texture, (H, W, 3)."""
+    packed = np.full((*maps.roughness.shape, 3), 255, np.uint8)
+    if maps.occlusion is not None:
+        packed[..., 0] = to_8bit(maps.occlusion)
+    packed[..., 1], packed[..., 2] = to_8bit(maps.roughness), to_8bit(maps.metallic)
     return packed

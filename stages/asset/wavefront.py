@@ -15,10 +15,13 @@ from stages.core.artifact import Artifact, write_text
 TEXTURES = {"map_Kd": "albedo.png", "map_Pr": "roughness.png", "map_Pm": "metallic.png"}
 
 
-def write_obj(path: Path, prep: Artifact) -> None:
+def write_obj(path: Path, prep: Artifact, relief: bool = False) -> None:
     """Write an OBJ from prep.npz, and the MTL it names beside it.
 
     Numbers are written with as many digits as their float64 needs, so reading them gives the same bits.
+
+    Args:
+        relief: whether there is a normal map for the MTL to name.
     """
     uv, uv_row = obj_uv(prep)
     normals, normal_row = obj_normals(prep)
@@ -26,7 +29,7 @@ def write_obj(path: Path, prep: Artifact) -> None:
     lines += _rows("v", prep["source_vertices"]) + _rows("vt", uv) + _rows("vn", normals)
     lines += _faces(prep, _corners(prep["loop_vertex"], uv_row, normal_row))
     write_text(path, "\n".join(lines) + "\n")
-    write_text(path.with_suffix(".mtl"), mtl([part["material"] for part in prep.provenance.extra["parts"]]))
+    write_text(path.with_suffix(".mtl"), mtl([part["material"] for part in prep.provenance.extra["parts"]], relief))
 
 
 def _faces(prep: Artifact, corners: list[str]) -> list[str]:
@@ -49,10 +52,11 @@ def slot_name(material: str) -> str:
     return material or "material"
 
 
-def mtl(materials: list[str]) -> str:
+def mtl(materials: list[str], relief: bool) -> str:
     """An MTL file: one material per slot, all with the same textures."""
     body = ["Kd 1 1 1", "Ks 0.5 0.5 0.5", "Ni 1.5", "illum 2", "Pr 1", "Pm 1"]
     body += [f"{key} {file}" for key, file in TEXTURES.items()]
+    body += ["norm normal.png"] * relief
     names = dict.fromkeys(slot_name(material) for material in materials)
     return "\n\n".join("\n".join([f"newmtl {name}", *body]) for name in names) + "\n"
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from stages.asset.traced import traced_scene
 from stages.conditions.cameras import Cameras, place_cameras
 from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
 from stages.conditions.options import ConditionsOptions
@@ -88,7 +89,7 @@ def conditions(
         save_cameras(out, cameras, request, options)
         for light in lights:
             save_environment(out / "environments" / f"{light.name}.exr", light)
-        scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        scene = traced_scene(mesh)
         smooth = scene.shaded_smooth() if options.profile == SD else None
         quality, expected = QUALITY[options.quality], None
         if options.error:

@@ -13,6 +13,7 @@ from stages.core.field import FieldConfig, MaterialField
 from stages.core.frames import Y_UP_TO_WORLD, look_at, transform_points
 from stages.core.polygons import triangulate
 from stages.core.schemas import MATERIAL, PREP
+from stages.prep.source import nothing_passed_on
 
 IDENTITY = np.eye(4).reshape(-1).tolist()
 
@@ -102,6 +103,9 @@ def prep_arrays(example: Example) -> dict[str, NDArray]:
         "face_part": np.array(example.part, "i4"),
         "face_group": np.array(example.group or [-1] * len(example.faces), "i4"),
         "loop_uv": uv,
+        "source_tangents": np.zeros((0, 4), "f4"),
+        "loop_source_tangent": np.full(len(loops), -1, "i4"),
+        "source_images": np.zeros(0, "u1"),
     }
 
 
@@ -113,6 +117,7 @@ def save_prep(path: Path, example: Example) -> Path:
         "uv_kept": example.uv_kept,
         "parts": example.parts,
         "groups": list(example.groups),
+        "passed_on": nothing_passed_on(),
         "findings": {"vertices": len(example.vertices)},
     }
     save_npz(path, PREP, prep_arrays(example), Provenance({}, None, {"mesh": "0" * 64}, extra))
