@@ -11,14 +11,15 @@ ALLOWED = {
     "core": set(),
     "light": {"core"},
     "material": {"core"},
+    "asset": {"core", "light"},
     "prior": {"core", "material"},
     "sd": {"core"},
     "prep": {"core", "light", "material", "prior"},
-    "conditions": {"core", "light", "material", "prior"},
+    "conditions": {"core", "light", "material", "prior", "asset"},
     "distill": {"core", "light", "material", "prior", "sd"},
-    "bake": {"core", "light", "material", "prior"},
-    "train": {"core", "light", "material", "prior", "sd", "prep", "conditions", "distill", "bake"},
-    "report": {"core", "light", "material", "prior", "sd", "prep", "conditions", "distill", "bake", "train"},
+    "bake": {"core", "light", "material", "prior", "asset"},
+    "train": {"core", "light", "material", "prior", "sd", "asset", "prep", "conditions", "distill", "bake"},
+    "report": {"core", "light", "material", "prior", "sd", "asset", "prep", "conditions", "distill", "bake", "train"},
 }
 
 SOURCES = sorted(path for package in ("stages", "dreammat_cli") for path in (ROOT / package).rglob("*.py"))

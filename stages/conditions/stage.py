@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from stages.asset.traced import traced_scene
 from stages.conditions.cameras import Cameras, place_cameras
 from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
 from stages.conditions.options import ConditionsOptions
@@ -89,7 +90,7 @@ def conditions(
         save_cameras(out, cameras, request, options)
         for light in lights:
             save_environment(out / "environments" / f"{light.name}.exr", light)
-        scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        scene = traced_scene(mesh)
         survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.occluded)
         save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None

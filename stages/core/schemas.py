@@ -7,7 +7,7 @@ from stages.core.artifact import Field, Schema
 
 PREP = Schema(
     "dreammat.prep",
-    1,
+    2,
     {
         # the working mesh: normalised world frame, welded, outward, triangles
         "vertices": Field("f4", ("V", 3)),
@@ -21,16 +21,21 @@ PREP = Schema(
         "source_vertices": Field("f8", ("SV", 3), finite=False),  # the file's numbers, node transforms not applied
         "source_uv": Field("f8", ("ST", 2), finite=False),  # the file's numbers; v as in the file's format
         "source_normals": Field("f4", ("SN", 3), finite=False),
+        "source_tangents": Field("f4", ("SG", 4), finite=False),
+        "source_images": Field("u1", ("B",)),  # bytes of the images of extra["passed_on"], one after the other
         "loop_start": Field("i4", ("P1",)),  # face p has loops loop_start[p] .. loop_start[p + 1] - 1
         "loop_vertex": Field("i4", ("L",)),
         "loop_source_uv": Field("i4", ("L",)),  # row of source_uv, or -1
         "loop_source_normal": Field("i4", ("L",)),  # row of source_normals, or -1
+        "loop_source_tangent": Field("i4", ("L",)),  # row of source_tangents, or -1
         "face_part": Field("i4", ("P",)),  # entry of extra["parts"]
+        "face_group": Field("i4", ("P",)),  # entry of extra["groups"], or -1
         "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, [0, 1], v up
     },
     # source_format: "obj" | "ply" | "stl" | "off" | "glb"; uv_kept: bool; findings: what was found and mended;
     # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row)}
-    extra=("source_format", "source_name", "uv_kept", "parts", "findings"),
+    # groups: names of an OBJ's groups; passed_on: what materials of a glTF had besides, see `stages.asset.passed_on`
+    extra=("source_format", "source_name", "uv_kept", "parts", "groups", "passed_on", "findings"),
 )
 
 CAMERAS = Schema(
@@ -91,5 +96,8 @@ MATERIAL = Schema(
     extra=("recipe", "residual", "prompt", "guidance", "environments"),
 )
 
-ASSET = Schema("dreammat.asset", 1, manifest="bake.json")
-"""A folder: albedo, roughness and metallic .exr; albedo.png, orm.png; model.glb; preview.png; bake.json."""
+ASSET = Schema("dreammat.asset", 2, manifest="bake.json")
+"""A folder: albedo, roughness and metallic .exr; albedo.png, orm.png; model.glb; preview.png; bake.json.
+
+Where the material has them: normal .exr and .png, height.exr, occlusion.exr.
+"""

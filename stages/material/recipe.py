@@ -85,6 +85,11 @@ class Recipe:
         return Recipe(_coat(data["base"]), layers, data["seed"])
 
     @property
+    def has_relief(self) -> bool:
+        """Whether any of it stands out or is sunk."""
+        return any(coat.relief and coat.look != PLAIN.base.look for coat in self.coats)
+
+    @property
     def follows_surface(self) -> bool:
         """Whether any mask asks for edges, creases or what is hidden."""
         return any(mask.kind in SURVEYED for layer in self.layers for mask in layer.masks)

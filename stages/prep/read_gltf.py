@@ -1,4 +1,5 @@
-"""glTF 2.0, as .glb and as .gltf with data URIs or files beside it: the geometry of the default scene, bit for bit.
+"""glTF 2.0, as .glb and as .gltf with data URIs or files beside it: the geometry of the default scene, bit for bit, and
+the textures of its materials that are not made anew.
 
 Own reader, because general ones flip v and re-index vertices. Source: glTF 2.0 specification, sections 3.5 to 3.7. A
 part is one primitive of one mesh on one node; vertices keep the order of their accessors, v = 0 is the top row.
@@ -8,6 +9,7 @@ Skins, morph targets and animations are counted and left out: the mesh is taken 
 import base64
 import json
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,10 +20,12 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import reason
 from stages.core.errors import InputError
-from stages.prep.source import Part, Source, check_range, polygons
+from stages.prep.source import Part, Source, check_range, nothing_passed_on, polygons
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+_SIGNATURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+TRANSFORM = "KHR_texture_transform"
 _POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_mesh_quantization",
              "KHR_animation_", "KHR_xmp", "KHR_node_visibility")  # fmt: skip
@@ -51,11 +55,12 @@ class _Geometry:
     positions: list[NDArray] = field(default_factory=list)
     uv: list[NDArray] = field(default_factory=list)
     normals: list[NDArray] = field(default_factory=list)
-    corners: list[tuple[NDArray, NDArray, NDArray]] = field(default_factory=list)  # vertex, uv, normal rows
+    tangents: list[NDArray] = field(default_factory=list)
+    corners: list[tuple[NDArray, ...]] = field(default_factory=list)  # vertex, uv, normal, tangent rows
     face_part: list[NDArray] = field(default_factory=list)
     parts: list[Part] = field(default_factory=list)
     skipped: dict[str, int] = field(default_factory=dict)
-    blocks: dict[tuple, tuple[int, int, int]] = field(default_factory=dict)  # (node, accessors) -> first rows
+    blocks: dict[tuple, tuple[int, ...]] = field(default_factory=dict)  # (node, accessors) -> first rows
 
     def skip(self, what: str, count: int = 1) -> None:
         self.skipped[what] = self.skipped.get(what, 0) + count
@@ -66,25 +71,34 @@ def read_gltf(path: Path) -> Source:
     gltf = _open(path)
     try:
         geometry = _gather(gltf)
+        passed_on, images = pass_on(gltf, geometry.skip)
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise InputError(f"{path}: not valid glTF 2.0 ({type(error).__name__}: {error}); export it again") from None
     corners = [np.concatenate(rows) if rows else np.zeros(0, np.int64) for rows in zip(*geometry.corners, strict=True)]
-    vertex, uv, normal = corners or [np.zeros(0, np.int64)] * 3
+    vertex, uv, normal, tangent = corners or [np.zeros(0, np.int64)] * 4
     positions = np.concatenate([np.zeros((0, 3)), *geometry.positions])
     start, loop_vertex = polygons(np.full(len(vertex) // 3, 3), len(positions), vertex, path)
     return Source(
         "glb", positions, np.concatenate([np.zeros((0, 2)), *geometry.uv]),
         np.concatenate([np.zeros((0, 3), np.float32), *geometry.normals]), start, loop_vertex, uv.astype(np.int32),
         normal.astype(np.int32), np.concatenate(geometry.face_part).astype(np.int32), geometry.parts, v_down=True,
-        skipped=geometry.skipped,
+        skipped=geometry.skipped, tangents=np.concatenate([np.zeros((0, 4), np.float32), *geometry.tangents]),
+        loop_tangent=tangent.astype(np.int32), passed_on=passed_on, images=images,
     )  # fmt: skip
 
 
 def companions(path: Path) -> dict[str, Path]:
-    """Files beside a .gltf that hold its buffers: URI -> path. Raises: InputError."""
-    buffers = _open(path).root.get("buffers", [])
-    uris = [buffer["uri"] for buffer in buffers if isinstance(buffer, dict) and isinstance(buffer.get("uri"), str)]
-    return {uri: path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")}
+    """Files beside a .gltf that hold its buffers, and those of its images that are there: URI -> path. Raises: InputError."""
+    root = _open(path).root
+    found: dict[str, Path] = {}
+    for kind in ("buffers", "images"):
+        for entry in root.get(kind, []):
+            uri = entry.get("uri") if isinstance(entry, dict) else None
+            if isinstance(uri, str) and not uri.startswith("data:"):
+                beside = path.parent / unquote(uri)
+                if kind == "buffers" or beside.is_file():
+                    found[uri] = beside
+    return found
 
 
 # ---------------------------------------------------------------------------------------------------- container
@@ -199,6 +213,95 @@ def _sparse(gltf: _Gltf, sparse: dict[str, Any], values: NDArray) -> NDArray:
     return values
 
 
+# ---------------------------------------------------------------------------------------------------- materials
+
+
+def material_name(materials: list[dict[str, Any]], index: int) -> str:
+    """A material's name, with its number where it has none or shares it with another."""
+    name = materials[index].get("name")
+    if not name:
+        return f"material_{index}"
+    first = next(i for i, material in enumerate(materials) if material.get("name") == name)
+    return name if first == index else f"{name}_{index}"
+
+
+def pass_on(gltf: _Gltf, skip: Callable[[str], None]) -> tuple[dict[str, Any], list[bytes]]:
+    """What materials have besides colour, roughness and metallic, as `stages.asset.passed_on` wants it.
+
+    Textures of another UV set than the first, in files that are not there, or neither PNG nor JPEG are counted and left
+    out. Returns: the description; the images' bytes.
+    """
+    held, files, rows = nothing_passed_on(), list[bytes](), dict[int, int | None]()
+    for index, material in enumerate(gltf.root.get("materials", [])):
+        properties: dict[str, Any] = {}
+        for kind in ("normalTexture", "occlusionTexture", "emissiveTexture"):
+            info = material.get(kind)
+            if info is None:
+                continue
+            texture = info["index"]
+            if texture not in rows:
+                rows[texture] = _add_texture(gltf, texture, held, files, skip)
+            if uv_set(info) != 0:
+                skip("textures_of_other_uv_sets")
+            elif rows[texture] is not None:
+                properties[kind] = _kept_info(info) | {"index": rows[texture]}
+        if "emissiveFactor" in material and (material.get("emissiveTexture") is None or "emissiveTexture" in properties):
+            properties["emissiveFactor"] = material["emissiveFactor"]
+            strength = material.get("extensions", {}).get("KHR_materials_emissive_strength")
+            if strength is not None:
+                properties["extensions"] = {"KHR_materials_emissive_strength": strength}
+        if properties:
+            held["materials"][material_name(gltf.root["materials"], index)] = properties
+    return held, files
+
+
+def uv_set(info: dict[str, Any]) -> int:
+    """The UV set that a texture is laid out for; KHR_texture_transform has the last word."""
+    return info.get("extensions", {}).get(TRANSFORM, {}).get("texCoord", info.get("texCoord", 0))
+
+
+def _kept_info(info: dict[str, Any]) -> dict[str, Any]:
+    """A texture's reference with its scale or strength and its transform, and nothing that would need another extension."""
+    kept = {key: value for key, value in info.items() if key in ("texCoord", "scale", "strength")}
+    if TRANSFORM in info.get("extensions", {}):
+        kept["extensions"] = {TRANSFORM: info["extensions"][TRANSFORM]}
+    return kept
+
+
+def _add_texture(gltf: _Gltf, index: int, held: dict, files: list[bytes], skip: Callable[[str], None]) -> int | None:
+    """Take up a texture and its image. Returns: its row, or None where the image cannot be had."""
+    texture = gltf.item("textures", index)
+    data = _image(gltf, texture["source"]) if "source" in texture else None
+    kind = next((mime for start, mime in _SIGNATURES.items() if data and data.startswith(start)), None)
+    if data is None or kind is None:
+        skip("textures_missing" if data is None else "textures_not_png_or_jpeg")
+        return None
+    if data not in files:
+        files.append(data)
+        name = gltf.item("images", texture["source"]).get("name", "")
+        held["images"].append({"name": name, "mimeType": kind, "length": len(data)})
+    entry: dict[str, Any] = {"image": files.index(data)}
+    if "sampler" in texture:
+        sampler = gltf.item("samplers", texture["sampler"])
+        entry["sampler"] = {k: v for k, v in sampler.items() if k in ("magFilter", "minFilter", "wrapS", "wrapT")}
+    held["textures"].append(entry)
+    return len(held["textures"]) - 1
+
+
+def _image(gltf: _Gltf, index: int) -> bytes | None:
+    """The bytes of an image file, or None where there is none."""
+    image = gltf.item("images", index)
+    if "bufferView" in image:
+        view = gltf.item("bufferViews", image["bufferView"])
+        start = view.get("byteOffset", 0)
+        return _buffer(gltf, view["buffer"])[start : start + view["byteLength"]]
+    uri = image["uri"]
+    if uri.startswith("data:"):
+        return base64.b64decode(uri.partition(",")[2])
+    beside = gltf.path.parent / unquote(uri)
+    return beside.read_bytes() if beside.is_file() else None
+
+
 # ---------------------------------------------------------------------------------------------------- scene
 
 
@@ -262,19 +365,19 @@ def _add_mesh(gltf: _Gltf, geometry: _Geometry, node_index: int, node: dict, tra
             geometry.skip("morph_targets", len(primitive["targets"]))
         material = ""
         if "material" in primitive:
-            material = gltf.item("materials", primitive["material"]).get("name") or f"material_{primitive['material']}"
+            gltf.item("materials", primitive["material"])
+            material = material_name(gltf.root["materials"], primitive["material"])
         corners = _add_vertices(gltf, geometry, node_index, primitive)
-        triangles = _triangles(gltf, primitive, mode, corners[3])
+        triangles = _triangles(gltf, primitive, mode, corners[-1])
         geometry.face_part.append(np.full(len(triangles), len(geometry.parts)))
         geometry.parts.append(Part(name, material, node.get("name") or f"node_{node_index}", flat))
         flat_index = triangles.reshape(-1)
-        check_range(flat_index, corners[3], "vertex", gltf.path)
-        rows = [np.where(first >= 0, first + flat_index, -1) for first in corners[:3]]
-        geometry.corners.append((rows[0], rows[1], rows[2]))
+        check_range(flat_index, corners[-1], "vertex", gltf.path)
+        geometry.corners.append(tuple(np.where(first >= 0, first + flat_index, -1) for first in corners[:-1]))
 
 
-def _add_vertices(gltf: _Gltf, geometry: _Geometry, node: int, primitive: dict) -> tuple[int, int, int, int]:
-    """First rows of a primitive's positions, UVs and normals (-1: none) and their count.
+def _add_vertices(gltf: _Gltf, geometry: _Geometry, node: int, primitive: dict) -> tuple[int, ...]:
+    """First rows of a primitive's positions, UVs, normals and tangents (-1: none) and their count.
 
     Primitives of one node that share their accessors share the rows.
     """
@@ -284,13 +387,13 @@ def _add_vertices(gltf: _Gltf, geometry: _Geometry, node: int, primitive: dict) 
             raise InputError(f"{gltf.path}: needs the glTF extension KHR_draco_mesh_compression, which is not read; "
                              "export without")  # fmt: skip
     attributes = primitive["attributes"]
-    names = [attributes.get(name) for name in ("POSITION", "TEXCOORD_0", "NORMAL")]
+    names = [attributes.get(name) for name in ("POSITION", "TEXCOORD_0", "NORMAL", "TANGENT")]
     key = (node, *names)
     count = gltf.item("accessors", names[0])["count"]
     if key not in geometry.blocks:
-        stores = (geometry.positions, geometry.uv, geometry.normals)
+        stores = (geometry.positions, geometry.uv, geometry.normals, geometry.tangents)
         firsts = []
-        for accessor, store, width in zip(names, stores, (3, 2, 3), strict=True):
+        for accessor, store, width in zip(names, stores, (3, 2, 3, 4), strict=True):
             if accessor is None:
                 firsts.append(-1)
                 continue
@@ -298,8 +401,9 @@ def _add_vertices(gltf: _Gltf, geometry: _Geometry, node: int, primitive: dict) 
             if values.shape != (count, width):
                 raise InputError(f"{gltf.path}: accessors[{accessor}] is {values.shape}, expected {(count, width)}")
             firsts.append(sum(len(block) for block in store))
-            store.append(values.astype(np.float32 if store is geometry.normals else np.float64))
-        geometry.blocks[key] = (firsts[0], firsts[1], firsts[2])
+            exact = store is geometry.positions or store is geometry.uv
+            store.append(values.astype(np.float64 if exact else np.float32))
+        geometry.blocks[key] = tuple(firsts)
     return (*geometry.blocks[key], count)
 
 
