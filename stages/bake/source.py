@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.jit import compiled
 from stages.core.artifact import Artifact
 from stages.core.frames import Y_UP_TO_WORLD
+from stages.core.parallel import compiled
 
 UNIT_TOLERANCE = 5e-3
 """A source normal whose length is within this of 1 is kept as it is; the glTF validator allows 6.7e-3."""

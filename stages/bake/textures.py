@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.jit import in_parallel
 from stages.core.artifact import write_exr
 from stages.core.color import srgb_decode
 from stages.core.images import write_png
+from stages.core.parallel import in_parallel
 
 MASTERS = {"albedo.exr": {"R": 0, "G": 1, "B": 2}, "roughness.exr": {"Y": 3}, "metallic.exr": {"Y": 4}}
 """File -> EXR channel -> index in the baked maps."""
