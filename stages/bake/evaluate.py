@@ -8,7 +8,7 @@ are fetched once and kept until a point leaves it, and the network runs in the s
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.jit import compiled, in_parallel
+from stages.core.parallel import compiled, in_parallel
 from stages.material.residual import HASH_PRIMES, OUTPUTS, Residual
 
 BLOCK = 256

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from stages.bake.evaluate import evaluate as evaluate_residual
 from stages.bake.raster import Layout, Surface, bands, covered_samples
-from stages.core.jit import compiled, in_parallel
+from stages.core.parallel import compiled, in_parallel
 from stages.core.progress import Progress
 from stages.material import surface as material_surface
 from stages.material.evaluate import COLUMNS, evaluate
