@@ -56,7 +56,8 @@ CONDITIONS = Schema(
     # to_world: 16 numbers, the mesh source's frame to world, row by row; profile: "gltf", or "sd", which has files of its own
     extra=("environments", "views", "knots", "clamped", "to_world"),
 )
-"""A folder: cameras.npz, survey.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr; see `core.views`."""
+"""A folder: cameras.npz, survey.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr; see
+`core.views`."""
 
 SURVEY = Schema(
     "dreammat.survey",

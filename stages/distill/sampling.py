@@ -134,7 +134,8 @@ class CropSampler:
         return [(seen[v], e) for v, e in zip(view, environment, strict=True)]
 
     def _crop(self, view: int, generator: torch.Generator) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
-        """Rows of the view's object pixels that a random crop shows, and their flat place in the square, (K,) each; its stride."""
+        """Rows of the view's object pixels that a random crop shows, and their flat place in the square, (K,) each; its
+        stride."""
         views, size = self._views, self._size
         whole = len(self._strides) < 2 or float(torch.rand((), generator=generator)) < WHOLE_VIEW_SHARE
         stride = self._strides[0 if whole else int(torch.randint(1, len(self._strides), (), generator=generator))]

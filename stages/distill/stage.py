@@ -175,7 +175,8 @@ def _stable_diffusion(options: DistillOptions, views: Views, device: torch.devic
 
 
 def new_state(options: DistillOptions, views: Views, device: torch.device) -> State:
-    """Residual and optimiser before the first step; the finest cells are as far apart as the surface points that all views see."""
+    """Residual and optimiser before the first step; the finest cells are as far apart as the surface points that all views
+    see."""
     spacing = views.pixel_size() / math.sqrt(max(1.0, len(views.seen) / SEEN_BY))
     residual = Residual(ResidualConfig.for_detail(spacing), torch.Generator().manual_seed(options.seed)).to(device)
     return State(residual, RowAdam(dict(residual.named_parameters()), tables=frozenset({"table"})))

@@ -1,8 +1,7 @@
 """Which draw of a recipe a run begins with: the one whose patterns follow the light least.
 
-Patterns wider than a shadow follow the light by chance, and what follows the light passes for light that was baked in. Seeds draw
-other patterns of the same material, so there is a choice.
-"""
+Patterns wider than a shadow follow the light by chance, and what follows the light passes for light that was baked in. Seeds
+draw other patterns of the same material, so there is a choice. """
 
 from dataclasses import replace
 

@@ -89,11 +89,11 @@ class Views:
 
     def pixel_size(self) -> float:
         """Median width of a pixel at the object, world units."""
-        return float(np.median([self.footprint(view, np.median(self._geometry[view].depth)) for view in self.seen]))
+        return float(np.median([self.footprint(view, np.array(np.median(self._geometry[view].depth))) for view in self.seen]))
 
-    def footprint(self, view: int, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    def footprint(self, view: int, depth: NDArray) -> NDArray[np.float32]:
         """Width of a pixel of a view at planar depths (P,), world units."""
-        return (2 * depth * np.tan(self.fov_y[view] / 2) / self.height).astype(np.float32)
+        return np.asarray(2 * depth * np.tan(self.fov_y[view] / 2) / self.height, np.float32)
 
     def surface(self, view: int, rows: NDArray[np.int64]) -> Surface:
         """The points of some object pixels of a view. Args: rows (K,) into `pixels(view)`."""

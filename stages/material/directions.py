@@ -1,10 +1,9 @@
 """Directions of a surface, along which courses, threads, boards and brushing run.
 
-A *piece* is a part that hangs together. Its `turn` is a rotation that takes the world to the piece: the third axis stays up, the first
-two are the piece's own horizontal axes, so that a wall which stands at an angle has level courses that start square. A piece that
-is round about an upright axis is measured around that axis, in whole turns; any other by its sides, like a box. `grain` is its
-longest direction, along which wood is sawn.
-"""
+A *piece* is a part that hangs together. Its `turn` is a rotation that takes the world to the piece: the third axis stays up,
+the first two are the piece's own horizontal axes, so that a wall which stands at an angle has level courses that start
+square. A piece that is round about an upright axis is measured around that axis, in whole turns; any other by its sides, like
+a box. `grain` is its longest direction, along which wood is sawn. """
 
 from typing import NamedTuple
 

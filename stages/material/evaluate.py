@@ -126,8 +126,8 @@ def turned(found: Look, coat: Coat) -> Look:
         roughness = coat.roughness + (roughness - mean.roughness) * np.float32(spread)
     if coat.metallic is not None:
         metallic = metallic + np.float32(coat.metallic - mean.metallic)
-    clipped = (np.clip(a, 0, 1) for a in (color, roughness, metallic))
-    return Look(*clipped, found.height, found.dye)
+    color, roughness, metallic = (np.clip(a, 0, 1) for a in (color, roughness, metallic))
+    return Look(color, roughness, metallic, found.height, found.dye)
 
 
 def recolored(color: Array, mean: Array, coat: Coat) -> Array:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 from stages.core.color import srgb_decode
 from stages.material.place import Place
 
-Array = NDArray[np.float32]
+Array = NDArray[Any]
+"""float32, or what it was mixed with."""
 
 
 class Look(NamedTuple):
-    """color: (3, P) linear Rec. 709. roughness, metallic: (P,) or a number. height: (P,) or a number, metres above the surface, about
-    0 on average. dye: (P,) or a number, how far a colour that words name applies here: a brick's clay takes it, its mortar does not.
-    """
+    """color: (3, P) linear Rec. 709. roughness, metallic: (P,) or a number. height: (P,) or a number, metres above the
+    surface, about 0 on average. dye: (P,) or a number, how far a colour that words name applies here: a brick's clay takes
+    it, its mortar does not. """
 
     color: Array
     roughness: Array | float

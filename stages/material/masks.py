@@ -1,8 +1,8 @@
 """Where a layer lies: by height and direction, on edges and in crevices, in spots, stripes and patches.
 
 A mask is a field over the surface and a level: it covers what lies above the level. Fields that are distances (height, stripes,
-spots) have borders as sharp as a texel; the others are roughened by noise at every scale, as wear does, so that no border is a blur.
-"""
+spots) have borders as sharp as a texel; the others are roughened by noise at every scale, as wear does, so that no border is
+a blur. """
 
 from dataclasses import replace
 
@@ -84,7 +84,8 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
 
 
 def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
-    """The recipe with each mask's level set so that it covers its share of this surface. Args: surface: evenly spread points."""
+    """The recipe with each mask's level set so that it covers its share of this surface. Args: surface: evenly spread
+    points."""
     uv, face = along(pieces, surface.piece, surface.point, surface.normal)
     world = Place(np.ascontiguousarray(surface.point.T), uv, face, surface.footprint, seed=recipe.seed)
 

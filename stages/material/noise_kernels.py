@@ -1,9 +1,8 @@
 """The inner loops of the procedural patterns: gradient noise, Worley cells and strokes on hashed lattices.
 
 Every kernel takes coordinates in lattice units, float32, one array an axis, and the lattice's period along each axis in whole
-units, 0 where it never repeats. Nothing is looked up in a table: a lattice point's numbers are a hash of its coordinates, which a
-vector unit computes for many points at once.
-"""
+units, 0 where it never repeats. Nothing is looked up in a table: a lattice point's numbers are a hash of its coordinates,
+which a vector unit computes for many points at once. """
 
 from typing import NamedTuple
 
@@ -29,7 +28,8 @@ class Period(NamedTuple):
 
 @inline
 def mixed(h):  # type: ignore[no-untyped-def]
-    """A 32-bit hash whose bits all depend on all bits of h. Source: Mueller 2012, by way of Wellons 2018, "Hash prospecting"."""
+    """A 32-bit hash whose bits all depend on all bits of h. Source: Mueller 2012, by way of Wellons 2018, "Hash
+    prospecting"."""
     h = np.uint32((h ^ (h >> np.uint32(16))) * np.uint32(0x7FEB352D))  # the compiler widens products to 64 bits
     h = np.uint32((h ^ (h >> np.uint32(15))) * np.uint32(0x846CA68B))
     return np.uint32(h ^ (h >> np.uint32(16)))
@@ -108,9 +108,8 @@ BLOCK = 128
 def worley(x, y, z, period, jitter, seed, near, second, border, ident, to_centre):  # type: ignore[no-untyped-def]
     """The two nearest of randomly placed points, one in each unit cube. Source: Worley 1996.
 
-    x, y, z: (P,). jitter: 0 (a grid) ... 1. near, second: (P,) distances to them. border: (P,) distance to the plane between the
-    two. ident: (P,) uint32 hash of the nearest. to_centre: (3, P) from the nearest point to here.
-    """
+    x, y, z: (P,). jitter: 0 (a grid) ... 1. near, second: (P,) distances to them. border: (P,) distance to the plane between
+    the two. ident: (P,) uint32 hash of the nearest. to_centre: (3, P) from the nearest point to here. """
     for start in range(0, len(x), BLOCK):
         part = slice(start, min(start + BLOCK, len(x)))
         _worley_block(
@@ -192,9 +191,9 @@ class Strokes(NamedTuple):
 def strokes(x, y, face, period, shape, seed, distance, along, ident):  # type: ignore[no-untyped-def]
     """Straight or bent strokes strewn over a plane; where several cross, the one that lies on top of the others.
 
-    x, y: (P,) in cells. face: (P,) int32, each with strokes of its own. distance: (P,) from the topmost stroke's middle line, in
-    cells, negative on its right; 9 where there is none. along: (P,) -1 ... 1 from one end to the other. ident: (P,) uint32 hash.
-    """
+    x, y: (P,) in cells. face: (P,) int32, each with strokes of its own. distance: (P,) from the topmost stroke's middle line,
+    in cells, negative on its right; 9 where there is none. along: (P,) -1 ... 1 from one end to the other. ident: (P,) uint32
+    hash. """
     for start in range(0, len(x), BLOCK):
         part = slice(start, min(start + BLOCK, len(x)))
         _strokes_block(x[part], y[part], face[part], period, shape, seed, distance[part], along[part], ident[part])

@@ -1,13 +1,12 @@
 """What substances are made of: noise with a spectrum, cells, spots, strokes, tiles and threads.
 
-Every pattern is a function of a `Place` and holds nothing finer than its footprint: octaves fade out as they reach it, edges are
-averaged over it, and what faded from below a threshold is put back as a softer edge (`threshold`). Lengths are metres. Where the
-place repeats, lengths are rounded so that a whole number of them fits its period.
-"""
+Every pattern is a function of a `Place` and holds nothing finer than its footprint: octaves fade out as they reach it, edges
+are averaged over it, and what faded from below a threshold is put back as a softer edge (`threshold`). Lengths are metres.
+Where the place repeats, lengths are rounded so that a whole number of them fits its period. """
 
 import math
 from statistics import NormalDist
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,8 @@ from stages.material import noise_kernels as kernels
 from stages.material.noise_kernels import Period, Strokes
 from stages.material.place import Axes, Place
 
-Array = NDArray[np.float32]
+Array = NDArray[Any]
+"""float32, or what it was mixed with."""
 
 SQUARE: Axes = (1.0, 1.0, 1.0)
 
@@ -24,11 +24,10 @@ SQUARE: Axes = (1.0, 1.0, 1.0)
 class Spectrum(NamedTuple):
     """How noise is made up, octave by octave.
 
-    size: wavelength of its widest octave, metres. finest: of its narrowest. rise: deviation of an octave, times that of the next
-    wider one: 1 is as much contrast at every scale, as real materials have, 0.5 is smooth. stretch: lengths along the axes, as
-    multiples. tails: 0 a normal distribution; 0.5 rare strong grains. skew: 0.3 grains are light on dark, −0.3 dark on light.
-    patch: how much finer octaves' strength varies from place to place, 0.4 in most materials.
-    """
+    size: wavelength of its widest octave, metres. finest: of its narrowest. rise: deviation of an octave, times that of the
+    next wider one: 1 is as much contrast at every scale, as real materials have, 0.5 is smooth. stretch: lengths along the
+    axes, as multiples. tails: 0 a normal distribution; 0.5 rare strong grains. skew: 0.3 grains are light on dark, −0.3 dark
+    on light. patch: how much finer octaves' strength varies from place to place, 0.4 in most materials. """
 
     size: float
     finest: float
@@ -114,7 +113,8 @@ def threshold(x: Array, level: Array | float, softness: Array | float) -> Array:
 
 
 def exceeds(x: Array, level: float, softness: float, hidden: Array) -> Array:
-    """Share of noise above a level, of which a part of deviation `hidden` cannot be seen. softness: of the border. Returns: (P,)."""
+    """Share of noise above a level, of which a part of deviation `hidden` cannot be seen. softness: of the border. Returns:
+    (P,)."""
     steepness = np.float32(1.702) / np.hypot(np.float32(max(0.6 * softness, 1e-3)), hidden)  # the logistic curve next to the normal one
     return (1 / (1 + np.exp(np.clip((level - x) * steepness, -40, 40)))).astype(np.float32)
 
@@ -144,9 +144,9 @@ def warped(at: Place, amount: float, size: float, seed: int = 0, octaves: int = 
 
 
 class Cells(NamedTuple):
-    """Cells around random points. near, second: (P,) distance to the nearest point and the next, metres. border: (P,) distance to
-    the cell's border, metres. ident: (P,) uint32 a hash of the cell. offset: (3, P) from its point, metres. size: metres.
-    """
+    """Cells around random points. near, second: (P,) distance to the nearest point and the next, metres. border: (P,)
+    distance to the cell's border, metres. ident: (P,) uint32 a hash of the cell. offset: (3, P) from its point, metres. size:
+    metres. """
 
     near: Array
     second: Array
@@ -198,9 +198,8 @@ def spots(
 
 
 class Marks(NamedTuple):
-    """Strokes: scratches, fibres, blades, hairs. cover: (P,) share of the footprint. across: (P,) −1 … 1 over the width, 9 where
-    there is none. along: (P,) −1 … 1 from end to end. ident: (P,) uint32.
-    """
+    """Strokes: scratches, fibres, blades, hairs. cover: (P,) share of the footprint. across: (P,) −1 … 1 over the width, 9
+    where there is none. along: (P,) −1 … 1 from end to end. ident: (P,) uint32. """
 
     cover: Array
     across: Array
@@ -238,9 +237,8 @@ def marks(
 
 
 class Tiles(NamedTuple):
-    """Tiles of a bond. ident: (P,) uint32. x, y: (P,) from the tile's middle, metres. width, height: of a tile, metres. border: (P,)
-    distance to the tile's rim, metres, positive inside. turned: (P,) whether the tile stands across.
-    """
+    """Tiles of a bond. ident: (P,) uint32. x, y: (P,) from the tile's middle, metres. width, height: of a tile, metres.
+    border: (P,) distance to the tile's rim, metres, positive inside. turned: (P,) whether the tile stands across. """
 
     ident: NDArray[np.uint32]
     x: Array
@@ -288,10 +286,9 @@ def _hash(value: Array, face: NDArray[np.int32], seed: np.uint32) -> NDArray[np.
 
 
 class Weave(NamedTuple):
-    """Threads over and under. height: (P,) 0 … 1 of the topmost thread's round back. warp: (P,) 1 where a warp thread (up) lies on top,
-    0 where a weft thread does. across: (P,) −1 … 1 over that thread. gap: (P,) 1 where no thread is. ident: (P,) uint32 of the
-    thread. seen: (P,) how much of single threads the footprint still shows.
-    """
+    """Threads over and under. height: (P,) 0 … 1 of the topmost thread's round back. warp: (P,) 1 where a warp thread (up)
+    lies on top, 0 where a weft thread does. across: (P,) −1 … 1 over that thread. gap: (P,) 1 where no thread is. ident: (P,)
+    uint32 of the thread. seen: (P,) how much of single threads the footprint still shows. """
 
     height: Array
     warp: Array

@@ -13,10 +13,9 @@ class Place:
     """Points at which a pattern is evaluated.
 
     p: (3, P) position in the pattern's own frame, metres; its third axis is up where up matters. uv: (2, P) metres along the
-    surface, across and up; see `directions.py`. face: (P,) which of the surface's sides uv belongs to. footprint: (P,) edge of the
-    texel or pixel that a point stands for, metres: nothing finer is held. period: metres after which everything repeats, by axis;
-    0 never. seed: of this substance on this thing.
-    """
+    surface, across and up; see `directions.py`. face: (P,) which of the surface's sides uv belongs to. footprint: (P,) edge
+    of the texel or pixel that a point stands for, metres: nothing finer is held. period: metres after which everything
+    repeats, by axis; 0 never. seed: of this substance on this thing. """
 
     p: NDArray[np.float32]
     uv: NDArray[np.float32]

@@ -1,8 +1,7 @@
 """What a thing is made of, as a procedure: a base and layers over it, each a substance and a mask that says where it lies.
 
-A recipe is plain data, so that it can be printed, stored in material.npz and edited. It has no resolution and knows no mesh. What
-follows a mesh (the lowest tenth, a fifth of the edges) is settled by `masks.settled` once the surface is known.
-"""
+A recipe is plain data, so that it can be printed, stored in material.npz and edited. It has no resolution and knows no mesh.
+What follows a mesh (the lowest tenth, a fifth of the edges) is settled by `masks.settled` once the surface is known. """
 
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -22,9 +21,8 @@ class Coat:
     """A substance as a recipe has it.
 
     look: its name in `substances.LOOKS`. color: sRGB mean that its dyed share is turned to, or None for its own. roughness,
-    metallic: means that it is turned to, or None. contrast: of its colours about their mean. metres: how long the object's longest
-    edge counts, for the size of its structure. relief: of its heights.
-    """
+    metallic: means that it is turned to, or None. contrast: of its colours about their mean. metres: how long the object's
+    longest edge counts, for the size of its structure. relief: of its heights. """
 
     look: str
     color: tuple[float, float, float] | None = None
@@ -38,10 +36,9 @@ class Coat:
 
 @dataclass(frozen=True)
 class Mask:
-    """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the height for "below" and "above". size: of its shapes or
-    of its border's noise, as a share of the object. wear: 0 a border as sharp as paint … 1 a ragged one. invert: everywhere else.
-    level: threshold of what the mask is made of, once settled; None before.
-    """
+    """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the height for "below" and "above". size: of its
+    shapes or of its border's noise, as a share of the object. wear: 0 a border as sharp as paint … 1 a ragged one. invert:
+    everywhere else. level: threshold of what the mask is made of, once settled; None before. """
 
     kind: str = "all"
     share: float = 0.3
@@ -87,7 +84,7 @@ class Recipe:
     @property
     def has_relief(self) -> bool:
         """Whether any of it stands out or is sunk."""
-        return any(coat.relief and coat.look != PLAIN.base.look for coat in self.coats)
+        return any(coat.relief and coat.look != EVEN.base.look for coat in self.coats)
 
     @property
     def follows_surface(self) -> bool:
@@ -105,5 +102,5 @@ def _coat(data: dict[str, Any]) -> Coat:
     return Coat(**{**data, "color": None if color is None else (color[0], color[1], color[2])})
 
 
-PLAIN = Recipe(Coat("even"))
+EVEN = Recipe(Coat("even"))
 """The same everywhere: where no words are read, all is learnt."""

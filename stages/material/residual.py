@@ -22,7 +22,6 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-
 FEATURES = 2
 """Features per table entry."""
 

@@ -1,20 +1,21 @@
 """Points of a surface, with what a material may follow: edges and creases, what is hidden, pieces and their directions."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float32]
+Array = NDArray[Any]
+"""float32, or what it was mixed with."""
 
 
 @dataclass(frozen=True)
 class Surface:
     """Points at which a material is asked for, in the world: the object's longest edge is 1, z is up.
 
-    point, normal: (P, 3). footprint: (P,) edge of the texel or pixel that each stands for. convexity: (P,) −1 in a crease … 1 on
-    an edge. occlusion: (P,) share of the sky that the object hides. piece: (P,) int32, row of the survey's pieces.
-    """
+    point, normal: (P, 3). footprint: (P,) edge of the texel or pixel that each stands for. convexity: (P,) −1 in a crease … 1
+    on an edge. occlusion: (P,) share of the sky that the object hides. piece: (P,) int32, row of the survey's pieces. """
 
     point: Array
     normal: Array

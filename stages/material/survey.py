@@ -1,9 +1,8 @@
 """What a material must know of a mesh: where its edges and creases are, what it hides from the sky, which pieces it has.
 
 A survey is some tens of thousands of points spread over the surface, more of them along sharp edges, each with what was found
-there. It is made once, from the mesh, and travels with the conditions and with material.npz, so that a point seen by a view and a
-texel of a bake are told the same.
-"""
+there. It is made once, from the mesh, and travels with the conditions and with material.npz, so that a point seen by a view
+and a texel of a bake are told the same. """
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -40,7 +39,8 @@ Blocked = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.bool_]
 
 
 class Survey(NamedTuple):
-    """point, normal: (S, 3) world. convexity, occlusion: (S,). piece: (S,) int32, row of `pieces`. pieces: what hangs together."""
+    """point, normal: (S, 3) world. convexity, occlusion: (S,). piece: (S,) int32, row of `pieces`. pieces: what hangs
+    together."""
 
     point: Array
     normal: Array
@@ -84,7 +84,7 @@ class Lookup:
         """
         if not len(point):
             return Surface.bare(point, normal, footprint)
-        distance, index = self._tree.query(point, MIXED)
+        distance, index = self._tree.query(point, [*range(1, min(MIXED, len(self.survey.point)) + 1)])
         agree = np.einsum("pkd,pd->pk", self.survey.normal[index], normal).clip(0.02, 1)
         weight = agree**2 / np.maximum(distance, 1e-6)
         weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
@@ -97,7 +97,8 @@ def make_survey(vertices: Array, triangles: NDArray[np.int32], normals: Array, b
     """Survey a mesh.
 
     Args:
-        vertices: (V, 3) world, welded. triangles: (F, 3). normals: (F, 3, 3) shading normal of each corner. blocked: traces rays.
+        vertices: (V, 3) world, welded. triangles: (F, 3). normals: (F, 3, 3) shading normal of each corner. blocked: traces
+        rays.
     """
     rng = np.random.default_rng(seed)
     corners = vertices[triangles].astype(np.float64)
@@ -161,8 +162,8 @@ def _beside_edges(
 
 
 def convexity(point: Array, normal: Array) -> Array:
-    """How far the surface around each point falls off below its tangent plane, against its distance: about 0.4 on a right-angled
-    edge, 0 on a plane, negative in a crease. Args: (S, 3) each. Returns: (S,)."""
+    """How far the surface around each point falls off below its tangent plane, against its distance: about 0.4 on a
+    right-angled edge, 0 on a plane, negative in a crease. Args: (S, 3) each. Returns: (S,)."""
     distance, index = cKDTree(point).query(point, NEAR, distance_upper_bound=REACH)
     found = np.isfinite(distance) & (distance > 0)
     index = np.where(found, index, 0)

@@ -1,8 +1,8 @@
 """A prompt cut into phrases: what is named, its colour and finish, its wear, and where it lies.
 
-The grammar is that of a buyer's list, not of English: a phrase is a run of words about one substance; "with", "and", "on", "covered
-in" join phrases; parts ("sole", "rim") and patterns ("stripes") say where a phrase lies. What no table knows is left to the reader.
-"""
+The grammar is that of a buyer's list, not of English: a phrase is a run of words about one substance; "with", "and", "on",
+"covered in" join phrases; parts ("sole", "rim") and patterns ("stripes") say where a phrase lies. What no table knows is left
+to the reader. """
 
 import re
 import unicodedata
@@ -41,9 +41,8 @@ JOINS = {
 class Phrase:
     """One run of words. join: how it follows the phrase before it, "" for the first. words: all of them, for the reader.
 
-    substance: a name of `SUBSTANCES`. colors: words that make up its colour. finish: words. weather: of `WEATHER`, `FADED`, `WET`.
-    thing: of `OBJECTS`. animal: of `ANIMALS`. region: where it lies, and the word that said so.
-    """
+    substance: a name of `SUBSTANCES`. colors: words that make up its colour. finish: words. weather: of `WEATHER`, `FADED`,
+    `WET`. thing: of `OBJECTS`. animal: of `ANIMALS`. region: where it lies, and the word that said so. """
 
     join: str = ""
     words: list[str] = field(default_factory=list)
@@ -103,7 +102,8 @@ def _take(phrase: Phrase, kind: str, text: str, value: Any) -> None:
 
 
 def _merged(phrases: list[Phrase]) -> list[Phrase]:
-    """Finish and wear that stand alone ("bronze, polished") belong to the phrase before; "worn edges showing brass" lends its place."""
+    """Finish and wear that stand alone ("bronze, polished") belong to the phrase before; "worn edges showing brass" lends its
+    place."""
     result: list[Phrase] = []
     for phrase in phrases:
         if result and not phrase.says_what and not phrase.region:

@@ -74,9 +74,8 @@ ANIMALS = {
 
 
 class Weather(NamedTuple):
-    """What a word of wear or weather lays over a thing. substance: words for it, "" where what is beneath shows. regions: where.
-    thickness: metres. strength: most that it covers.
-    """
+    """What a word of wear or weather lays over a thing. substance: words for it, "" where what is beneath shows. regions:
+    where. thickness: metres. strength: most that it covers. """
 
     substance: str
     regions: tuple[Region, ...]

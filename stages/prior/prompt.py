@@ -1,14 +1,12 @@
 """A prompt read as a recipe: its phrases as coats, what joins them as masks.
 
-Words that a table knows mean what it says. Words that none knows are read by the prior's reader, which was trained on the same tables
-and explains other words by a dictionary, and look like the substance whose name means most nearly the same.
-"""
+Words that a table knows mean what it says. Words that none knows are read by the prior's reader, which was trained on the
+same tables and explains other words by a dictionary, and look like the substance whose name means most nearly the same. """
 
 from dataclasses import replace
 
 import numpy as np
 
-from stages.core.color import srgb_encode
 from stages.material.recipe import Coat, Layer, Mask, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, named, rgb
@@ -89,7 +87,7 @@ class Reading:
         else:
             name = "paint" if phrase.colors else "stone"
         substance = _chosen(name, bool(phrase.colors))
-        mean = _color(phrase) if phrase.colors else np.mean([rgb(text) for text in substance.colors], 0)
+        mean = np.array(_color(phrase)) if phrase.colors else np.mean([rgb(text) for text in substance.colors], 0)
         finish = _finish(phrase, substance)
         roughness = np.mean(finish or substance.roughness)
         for word in phrase.weather:

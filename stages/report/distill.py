@@ -22,14 +22,15 @@ from torch import Tensor
 
 from stages.core.artifact import Provenance, write_text
 from stages.core.errors import InputError
-from stages.core.field import MaterialField
 from stages.core.progress import Progress, silent
 from stages.core.shading import KNOTS, Material, Transport, shade_reference
+from stages.distill.base import Base
 from stages.distill.guidance.sd import BUDGET, StableDiffusionGuidance, view_size
 from stages.distill.options import DistillOptions
 from stages.distill.sampling import CropSampler
 from stages.distill.stage import Clock, Run, chosen_device, draw, new_state, optimisation_step
 from stages.distill.views import Views
+from stages.material.residual import Residual
 from stages.report.counters import Cost, Stopwatch, count, peak_bandwidth, peak_flops
 from stages.report.options import DistillReportOptions
 from stages.sd import files, memory, models
@@ -99,16 +100,16 @@ def report_distill(conditions: Path, out: Path, options: DistillReportOptions, p
     for i in range(options.warm_up + options.steps):
         progress("measured steps", i, options.warm_up + 2 * options.steps)
         run.clock, timed.seconds = Waiting(device), {}
-        run.state.loss.append(optimisation_step(run, *draw(run, run.state.step)))
+        run.state.loss.append(optimisation_step(run, draw(run, run.state.step)))
         steps.append(run.clock.per_step(1) | {name: 1000 * s for name, s in timed.seconds.items()})
     run.clock, whole = Clock(), Stopwatch(device)
     for i in range(options.steps):
         progress("whole steps", options.warm_up + options.steps + i, options.warm_up + 2 * options.steps)
-        run.state.loss.append(optimisation_step(run, *draw(run, run.state.step)))
+        run.state.loss.append(optimisation_step(run, draw(run, run.state.step)))
     step = 1000 * whole.seconds() / options.steps
     middle = {name: float(np.median([s[name] for s in steps[options.warm_up :]])) for name in steps[0]}
     pixels = sum(len(views.pixels(view)) for view in views.seen) // len(views.seen) * options.batch
-    costs = counted(run.state.field, model, pixels, options.batch, size)
+    costs = counted(run.state.residual, model, pixels, options.batch, size)
     dtype = next(model.denoiser.parameters()).dtype
     peaks = peak_flops(device, dtype, MATRIX[device.type]), peak_bandwidth(device, COPY[device.type])
     name = torch.cuda.get_device_name(device) if device.type == "cuda" else f"cpu, {torch.get_num_threads()} threads"
@@ -206,10 +207,10 @@ def networks(device: torch.device) -> tuple[Any, Any, Any]:
 
 def _run(views: Views, guidance: StableDiffusionGuidance, options: DistillOptions, device: torch.device) -> Run:
     state = new_state(options, views, device)
-    return Run(Path(), views, guidance, options, BUDGET, Provenance({}, 0, {}), state, Clock())
+    return Run(Path(), views, guidance, Base(guidance.recipe, views), options, BUDGET, Provenance({}, 0, {}), state, Clock())
 
 
-def counted(field: MaterialField, model: models.StableDiffusion, points: int, batch: int, size: int) -> dict[str, Cost]:
+def counted(residual: Residual, model: models.StableDiffusion, points: int, batch: int, size: int) -> dict[str, Cost]:
     """What the parts of a step cost, on the meta device. Args: points: object pixels of the batch."""
     meta = torch.device("meta")
     with meta:
@@ -217,14 +218,14 @@ def counted(field: MaterialField, model: models.StableDiffusion, points: int, ba
         specular, cosine = torch.empty(points, len(KNOTS), 3), torch.empty(points)
         transport = Transport(E, specular, specular.clone(), cosine)
         picture = torch.empty(batch, 3, size, size)
-    copy = deepcopy(field).to(meta)
+    copy = deepcopy(residual).to(meta)
     material = Material.of(torch.empty(points, 5, device=meta, requires_grad=True))
-    costs = {"field": count(lambda: copy(where)), "shading": count(lambda: shade_reference(transport, material))}
+    costs = {"residual": count(lambda: copy(where)), "shading": count(lambda: shade_reference(transport, material))}
     both = {
-        "field": count(lambda: copy(where).columns().sum().backward()),
+        "residual": count(lambda: copy(where).sum().backward()),
         "shading": count(lambda: shade_reference(transport, material).sum().backward()),
     }
-    costs["backward"] = both["field"] + both["shading"] - costs["field"] - costs["shading"]
+    costs["backward"] = both["residual"] + both["shading"] - costs["residual"] - costs["shading"]
     with meta:
         unet, controlnet, vae = (type(network).from_config(network.config) for network in _networks_of(model))
     for network, placed in zip((unet, controlnet, vae), _networks_of(model), strict=True):
@@ -248,7 +249,8 @@ def counted(field: MaterialField, model: models.StableDiffusion, points: int, ba
 
 NAMES = {
     "data": "light of a view, to the device",
-    "field": "field",
+    "recipe": "recipe",
+    "residual": "residual",
     "shading": "shading",
     "encode": "VAE encoder",
     "denoise": "ControlNet and UNet, 3 branches",

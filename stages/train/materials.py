@@ -8,11 +8,11 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from stages.core.color import srgb_encode
+from stages.prior.colors import COLORS, COMMON, draw_named, rgb
+from stages.prior.names import FINISHES, FINISHES_METAL, METALS, SUBSTANCES, Substance
 from stages.prior.patterns import DARK_BELOW, LEVEL, placement
 from stages.prior.recipe import Coat, Recipe, Surface, draw_layout
 from stages.train.captions import Words, caption, pick, pick_weighted
-from stages.prior.colors import COLORS, COMMON, draw_named, rgb
-from stages.prior.names import FINISHES, FINISHES_METAL, METALS, SUBSTANCES, Substance
 
 SHARES = np.cumsum([s.weight for s in SUBSTANCES])[:-1] / sum(s.weight for s in SUBSTANCES)
 """Upper end of each substance's share of [0, 1), but the last's."""

@@ -17,11 +17,11 @@ import torch
 from numpy.typing import NDArray
 
 from stages.core.artifact import Provenance, save_npz, sha256_file
+from stages.prior.colors import WORDS
+from stages.prior.names import FINISHES, FINISHES_METAL, HELD_OUT, OBJECTS, SUBSTANCES
 from stages.prior.text import VOCABULARY
 from stages.train.captions import template_words
-from stages.prior.colors import WORDS
 from stages.train.dictionary import INDEX, PARTS, Explainer, Sense, by_word, senses
-from stages.prior.names import FINISHES, FINISHES_METAL, HELD_OUT, OBJECTS, SUBSTANCES
 
 CONTEXTS = ("{}", "{} material", "{} colored texture")
 TOPICS = ("material", "texture", "surface", "metal", "wood", "stone", "fabric", "plastic", "ceramic", "color", "paint",

@@ -9,10 +9,12 @@ import torch
 from numpy.typing import NDArray
 
 from stages.core.artifact import Provenance, save_npz, sha256_file
-from stages.core.field import FieldConfig, MaterialField
 from stages.core.frames import Y_UP_TO_WORLD, look_at, transform_points
 from stages.core.polygons import triangulate
 from stages.core.schemas import MATERIAL, PREP
+from stages.material.recipe import EVEN, Recipe
+from stages.material.residual import Residual, ResidualConfig
+from stages.material.survey import EMPTY, Survey
 from stages.prep.source import nothing_passed_on
 
 IDENTITY = np.eye(4).reshape(-1).tolist()
@@ -124,21 +126,24 @@ def save_prep(path: Path, example: Example) -> Path:
     return path
 
 
-def small_field(seed: int = 0, variation: float = 3.0) -> MaterialField:
-    """A field of four levels; variation: how far its features spread."""
-    field_ = MaterialField(FieldConfig(levels=4, log2_entries=12, base=4), torch.Generator().manual_seed(seed))
+def small_residual(seed: int = 0, variation: float = 3.0) -> Residual:
+    """A residual of four levels; variation: how far its features spread."""
+    made = Residual(ResidualConfig(levels=4, log2_entries=12, base=4), torch.Generator().manual_seed(seed))
     with torch.no_grad():
-        field_.table.mul_(variation * 1e4)
-    return field_
+        made.table.mul_(variation * 1e4)
+    return made
 
 
-def constant_field(material: tuple[float, ...]) -> MaterialField:
-    """A field that has one material everywhere: albedo, roughness, metallic."""
-    field_ = small_field()
+EVEN_VALUES = torch.tensor((0.27, 0.27, 0.27, 0.55, 0.12))
+
+
+def constant(material: tuple[float, ...]) -> Residual:
+    """What makes one material of an even recipe, everywhere: albedo, roughness, metallic."""
+    made = small_residual()
     with torch.no_grad():
-        field_.weights_1.zero_()
-        field_.bias_1.copy_(torch.logit(torch.tensor(material)))
-    return field_
+        made.weights_1.zero_()
+        made.bias_1.copy_(torch.logit(torch.tensor(material)) - torch.logit(EVEN_VALUES))
+    return made
 
 
 def ring_of_cameras(count: int, elevation: float = 0.5, distance: float = 3.0) -> NDArray[np.float64]:
@@ -149,17 +154,21 @@ def ring_of_cameras(count: int, elevation: float = 0.5, distance: float = 3.0) -
     return look_at(eye, np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
 
-def save_material(path: Path, prep: Path, field_: MaterialField, c2w: NDArray | None = None) -> Path:
+def save_material(
+    path: Path, prep: Path, residual: Residual, c2w: NDArray | None = None, recipe: Recipe = EVEN, survey: Survey = EMPTY
+) -> Path:
     """Write material.npz for a prep.npz."""
     cameras = ring_of_cameras(6) if c2w is None else c2w
     arrays = {
-        **field_.to_arrays(),
+        **survey.to_arrays(),
+        **residual.to_arrays(),
         "curve_step": np.arange(2, dtype="i4"),
         "curve_loss": np.ones(2, "f4"),
         "c2w": cameras,
         "fov_y": np.full(len(cameras), 0.7),
         "size": np.array([64, 64], "i4"),
     }
-    extra = {"field": field_.config_dict(), "prompt": "a thing", "guidance": {"name": "none"}, "environments": []}
+    extra = {"recipe": recipe.to_json(), "residual": residual.config_dict()}
+    extra |= {"prompt": "a thing", "guidance": {"name": "none"}, "environments": []}
     save_npz(path, MATERIAL, arrays, Provenance({}, 5, {"prep": sha256_file(prep)}, extra))
     return path

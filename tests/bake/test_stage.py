@@ -22,13 +22,13 @@ from stages.core.schemas import ASSET
 from tests.asset.glb import Glb
 from tests.asset.test_models import khronos_issues
 from tests.bake.examples import (
-    constant_field,
+    constant,
     cube,
     grid,
     ring_of_cameras,
     save_material,
     save_prep,
-    small_field,
+    small_residual,
 )
 from tests.conftest import Golden
 
@@ -50,7 +50,7 @@ def constant_asset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A cube baked with one material; its source was an OBJ."""
     folder = tmp_path_factory.mktemp("constant")
     prep = save_prep(folder / "prep.npz", cube().with_(source_format="obj"))
-    material = save_material(folder / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(folder / "material.npz", prep, constant(MATERIAL))
     bake(prep, material, folder / "asset", SMALL)
     return folder
 
@@ -100,7 +100,7 @@ def test_relief_and_occlusion_are_written_where_a_material_has_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prep = save_prep(tmp_path / "prep.npz", cube().with_(source_format="obj"))
-    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
     flat_maps = stage.bake_maps
     height = np.random.default_rng(0).random((512, 512), np.float32) * np.float32(1e-3)
 
@@ -132,7 +132,7 @@ def test_relief_and_occlusion_are_written_where_a_material_has_them(
 def test_relief_shows_in_the_preview(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The picture is shaded with the baked normal map: grooves change it on the object and nowhere else."""
     prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
     bake(prep, material, tmp_path / "flat", SMALL)
     flat_maps = stage.bake_maps
     grooves = np.broadcast_to(2e-3 * np.sin(np.arange(512, dtype=np.float32) / 3), (512, 512))
@@ -173,7 +173,7 @@ def test_another_request_replaces_the_folder_and_takes_its_old_files_away(tmp_pa
     out = tmp_path / "asset"
     for source_format in ("obj", "ply"):
         prep = save_prep(tmp_path / "prep.npz", cube().with_(source_format=source_format))
-        material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+        material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
         bake(prep, material, out, SMALL)
         (out / "mine.txt").write_text("not ours")
     assert not (out / "model.obj").exists()
@@ -183,7 +183,7 @@ def test_another_request_replaces_the_folder_and_takes_its_old_files_away(tmp_pa
 @pytest.mark.usefixtures("no_preview")
 def test_a_failure_leaves_no_manifest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
     out = tmp_path / "asset"
     bake(prep, material, out, SMALL)
 
@@ -199,7 +199,7 @@ def test_a_failure_leaves_no_manifest(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_the_material_of_another_mesh_is_refused(tmp_path: Path) -> None:
     prep, other = save_prep(tmp_path / "prep.npz", cube()), save_prep(tmp_path / "other.npz", grid(2))
-    material = save_material(tmp_path / "material.npz", other, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", other, constant(MATERIAL))
     with pytest.raises(ArtifactError, match=r"material\.npz: made from another prep") as caught:
         bake(prep, material, tmp_path / "asset", SMALL)
     assert "\n" not in str(caught.value)
@@ -208,7 +208,7 @@ def test_the_material_of_another_mesh_is_refused(tmp_path: Path) -> None:
 
 def test_swapped_missing_and_damaged_inputs_are_named(tmp_path: Path) -> None:
     prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
     with pytest.raises(ArtifactError, match=r"material\.npz: a dreammat\.material artefact, expected dreammat\.prep"):
         bake(material, prep, tmp_path / "asset", SMALL)
     with pytest.raises(ArtifactError, match=r"nothing\.npz"):
@@ -220,7 +220,7 @@ def test_swapped_missing_and_damaged_inputs_are_named(tmp_path: Path) -> None:
 
 def test_a_file_where_the_folder_should_be_is_named(tmp_path: Path) -> None:
     prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
     (tmp_path / "asset").write_text("a file")
     with pytest.raises(OutputError, match="asset: cannot be written"):
         bake(prep, material, tmp_path / "asset", SMALL)
@@ -230,7 +230,7 @@ def test_a_file_where_the_folder_should_be_is_named(tmp_path: Path) -> None:
 def test_uvs_that_cover_nothing_are_an_error(tmp_path: Path) -> None:
     example = cube()
     prep = save_prep(tmp_path / "prep.npz", example.with_(loop_uv=0 * example.loop_uv))
-    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
     with pytest.raises(ArtifactError, match=r"prep\.npz: its UVs cover no texel"):
         bake(prep, material, tmp_path / "asset", SMALL)
 
@@ -245,11 +245,11 @@ def test_options_out_of_range_are_refused(wrong: dict[str, int]) -> None:
 def test_unseen_surface_takes_the_colour_of_seen_surface(tmp_path: Path) -> None:
     """Below the cube nobody looks: the field's own values there must not appear, those of its sides must."""
     prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, small_field())
+    material = save_material(tmp_path / "material.npz", prep, small_residual())
     bake(prep, material, tmp_path / "asset", SMALL)
     hidden = read_exr(tmp_path / "asset" / "albedo.exr").channels["R"].astype(float)
     every_side = np.concatenate([ring_of_cameras(4, 0.5), ring_of_cameras(4, -0.5), ring_of_cameras(1, 1.5)])
-    seen = save_material(tmp_path / "seen.npz", prep, small_field(), every_side)
+    seen = save_material(tmp_path / "seen.npz", prep, small_residual(), every_side)
     bake(prep, seen, tmp_path / "seen", SMALL)
     whole = read_exr(tmp_path / "seen" / "albedo.exr").channels["R"].astype(float)
     report = json.loads((tmp_path / "seen" / "bake.json").read_text())["extra"]
@@ -278,7 +278,7 @@ def test_bilinear_look_up_at_centres_between_them_and_beyond() -> None:
 def test_golden_bake(tmp_path: Path, golden: Golden) -> None:
     """A cube with a varied material, seen from above; every eighth texel, and the preview."""
     prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, small_field())
+    material = save_material(tmp_path / "material.npz", prep, small_residual())
     result = bake(prep, material, tmp_path / "asset", BakeOptions(size=512, supersample=2, preview_size=32))
     folder = result.folder
     channels = {name: read_exr(folder / f"{name}.exr").channels for name in ("albedo", "roughness", "metallic")}

@@ -13,9 +13,12 @@ from PIL import Image
 from stages.core.albedo import specular_albedo
 from stages.core.artifact import Provenance, save_npz, write_manifest
 from stages.core.frames import camera_rays, look_at
-from stages.core.schemas import CAMERAS, CONDITIONS
+from stages.core.schemas import CAMERAS, CONDITIONS, SURVEY
 from stages.core.shading import KNOTS, Transport, light_maps
 from stages.core.views import SD, Geometry, view_folder, write_geometry, write_light_maps, write_transport
+from stages.material import survey
+from stages.material.directions import WHOLE
+from stages.material.survey import Survey
 
 RADIUS = 0.5
 FOV = np.radians(35.0)
@@ -67,7 +70,8 @@ def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str 
     cameras = {"c2w": c2w, "fov_y": np.full(views, FOV), "width": np.array(size, "i4"), "height": np.array(size, "i4")}
     made = Provenance({"views": views, "size": size}, 0, {"prep": "0" * 64})
     save_npz(folder / "cameras.npz", CAMERAS, cameras, made)
-    files = ["cameras.npz"]
+    save_npz(folder / "survey.npz", SURVEY, sphere_survey().to_arrays(), made)
+    files = ["cameras.npz", "survey.npz"]
     for view in range(views):
         geometry, n, wo = sphere_view(c2w[view], size)
         write_geometry(folder, view, geometry)
@@ -83,6 +87,18 @@ def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str 
     extra["profile"] = profile
     write_manifest(folder, CONDITIONS, Provenance(made.options, 0, made.inputs, extra), files)
     return folder
+
+
+def sphere_survey() -> Survey:
+    """Points spread evenly over the sphere, in a spiral; no ray meets it."""
+    count = 4000
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.arange(count) * np.pi * (3 - np.sqrt(5))
+    normal = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], 1).astype(np.float32)
+    point, zero = np.float32(RADIUS) * normal, np.zeros(count, np.float32)
+    order = np.random.default_rng(0).permutation(count)  # its first ones are evenly spread, too
+    shape = survey.convexity(point, normal)
+    return Survey(point[order], normal[order], shape[order], zero, np.zeros(count, np.int32), WHOLE)
 
 
 def identity() -> list[float]:

@@ -12,9 +12,9 @@ from torch import Tensor
 from stages.core.shading import Material, shade
 from stages.distill.guidance.prior import PriorGuidance
 from stages.distill.options import DistillOptions
-from stages.distill.regularizers import encoded
 from stages.distill.sampling import CropSampler
 from stages.distill.views import Views
+from stages.material.recipe import EVEN
 from stages.prior import profile
 from stages.prior.text import TextEmbedding
 from tests.distill.examples import write_conditions
@@ -55,15 +55,10 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
     return Views(write_conditions(tmp_path_factory.mktemp("prior") / "conditions"))
 
 
-def rising(points: Tensor, normals: Tensor) -> Tensor:
-    """A start that is brighter, rougher and more metallic the higher."""
-    return (points[:, 2:] + 0.5).clamp(0, 1).expand(-1, 5)
-
-
 def guidance(views: Views, colour: float, batch: int = 2, **options: Any) -> PriorGuidance:
     chosen = DistillOptions(prompt="flat", negative_prompt="bad", batch=batch, **options)
     sampler = CropSampler(views, SIZE, batch, torch.device("cpu"))
-    return PriorGuidance(FlatPrior(colour), sampler, chosen, lambda: rising)  # type: ignore[arg-type, return-value]
+    return PriorGuidance(FlatPrior(colour), sampler, chosen, lambda: EVEN)  # type: ignore[arg-type]
 
 
 def shown(made: PriorGuidance, seed: int = 0) -> tuple[Any, Tensor, torch.Generator]:
@@ -113,14 +108,6 @@ def test_a_negative_prompt_without_weight_is_not_asked(views: Views) -> None:
     made.respond(radiance, sample, 0.9, generator)
     _, conditions = made._prior.calls[-1]  # type: ignore[attr-defined]
     assert conditions.shape == (4, 23, SIZE, SIZE)
-
-
-def test_points_learn_what_the_words_call_for_there(views: Views) -> None:
-    made = guidance(views, 0.0)
-    sample, radiance, generator = shown(made)
-    expected = made.respond(radiance, sample, 0.9, generator).expected
-    assert expected is not None
-    torch.testing.assert_close(expected, encoded(rising(sample.points, sample.normals)))
 
 
 def test_same_generator_same_gradient(views: Views) -> None:

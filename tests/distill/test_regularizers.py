@@ -2,9 +2,9 @@
 
 import torch
 
-from stages.core.color import srgb_encode
 from stages.core.shading import Material
 from stages.distill import regularizers
+from stages.material.residual import combined
 
 
 def material(value: float) -> Material:
@@ -20,8 +20,9 @@ def test_displacement_stays_in_the_tangent_plane_and_has_the_papers_spread() -> 
 
 
 def test_smoothness_is_the_squared_distance() -> None:
-    assert float(regularizers.smoothness(material(0.5), material(0.5))) == 0
-    torch.testing.assert_close(regularizers.smoothness(material(0.5), material(0.2)), torch.tensor(5 * 0.09))
+    here, nearby = torch.full((7, 5), 0.5), torch.full((7, 5), 0.2)
+    assert float(regularizers.smoothness(here, here)) == 0
+    torch.testing.assert_close(regularizers.smoothness(here, nearby), torch.tensor(5 * 0.09 * regularizers.SLOPE**2))
 
 
 def test_bimodality_is_zero_at_both_ends_and_pushes_away_from_the_middle() -> None:
@@ -32,23 +33,22 @@ def test_bimodality_is_zero_at_both_ends_and_pushes_away_from_the_middle() -> No
     assert gradient[2] > 0 > gradient[3]
 
 
-def test_distance_is_squared_and_sees_albedo_as_srgb() -> None:
-    expected = torch.full((5, 5), 0.5)
-    expected[:, :3] = srgb_encode(torch.tensor(0.5))
-    assert float(regularizers.distance(material(0.5), expected)) < 1e-12
-    expected[:, 3] += 0.1
-    torch.testing.assert_close(regularizers.distance(material(0.5), expected), torch.tensor(0.01))
+def test_the_hold_is_how_far_the_material_has_moved() -> None:
+    """To first order, of a material in the middle of its range."""
+    learnt = 0.1 * torch.randn(400, 5, generator=torch.Generator().manual_seed(0))
+    moved = combined(torch.full((400, 5), 0.5), learnt) - 0.5
+    torch.testing.assert_close(regularizers.hold(learnt), moved.square().sum(1).mean(), rtol=0.02, atol=0)
 
 
 def test_baked_light_is_the_departure_that_follows_the_light() -> None:
     generator = torch.Generator().manual_seed(0)
     light = torch.rand(2000, 1, generator=generator).exp() * torch.ones(3)
     texture = 0.2 + 0.3 * torch.rand(2000, 1, generator=generator) * torch.ones(3)
-    expected = torch.cat([srgb_encode(texture), torch.full((2000, 2), 0.5)], 1)
+    base = torch.cat([texture, torch.full((2000, 2), 0.5)], 1)
 
     def loss(albedo: torch.Tensor) -> float:
         values = torch.full((2000,), 0.5)
-        return float(regularizers.baked_light(Material(albedo, values, values), expected, light))
+        return float(regularizers.baked_light(Material(albedo, values, values), base, light))
 
     assert loss(texture) < 1e-10  # a texture is no departure
     even, lit = loss(texture * 1.2), loss(texture * (light / light.mean()) ** 0.5)

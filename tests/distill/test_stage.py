@@ -14,8 +14,8 @@ import torch
 from stages.core import parallel
 from stages.core.artifact import load_npz, peek
 from stages.core.errors import ArtifactError, InputError, NumericalError
-from stages.core.field import MaterialField
 from stages.core.schemas import MATERIAL
+from stages.core.shading import Material
 from stages.distill import checkpoint, stage, start
 from stages.distill.guidance import reference
 from stages.distill.guidance.base import Budget, Response
@@ -24,6 +24,9 @@ from stages.distill.sampling import CropSampler, PixelSampler
 from stages.distill.stage import distill
 from stages.distill.views import Views
 from stages.light.textured_model import TexturedModel
+from stages.material.evaluate import evaluate
+from stages.material.learnt import LearntMaterial
+from stages.material.residual import combined
 from tests.conftest import Golden
 from tests.distill.examples import painted_sphere, write_conditions
 
@@ -69,13 +72,19 @@ def test_quality_multiplies_the_steps_and_steps_replace_it() -> None:
     assert stage.chosen_budget(DistillOptions(learning_rate=0.5), called_for).learning_rate == 0.5
 
 
+def learnt_at(path: Path, points: torch.Tensor) -> Material:
+    """The material of points (P, 3) by material.npz, the normals of a sphere's."""
+    learnt = LearntMaterial.of(path, load_npz(path, MATERIAL))
+    surface = learnt.lookup.surface(points.numpy(), torch.nn.functional.normalize(points).numpy(), np.full(len(points), 1e-3, "f4"))
+    base = torch.from_numpy(evaluate(learnt.recipe, surface)[:, :5])
+    return Material.of(combined(base, learnt.residual(points)))
+
+
 def test_golden(folder: Path, tmp_path: Path, golden: Golden) -> None:
     out = tmp_path / "material.npz"
     result = distill(folder / "conditions", out, options(folder, smoothness=0.1))
     material = load_npz(out, MATERIAL)
-    field = MaterialField.from_arrays(material.provenance.extra["field"], material.arrays)
-    p = torch.rand(64, 3, generator=torch.Generator().manual_seed(0)) - 0.5
-    found = field(p)
+    found = learnt_at(out, torch.rand(64, 3, generator=torch.Generator().manual_seed(0)) - 0.5)
     assert result.steps == 12 and not result.up_to_date
     arrays = {"albedo": found.albedo, "roughness": found.roughness, "metallic": found.metallic}
     # Adam divides by the gradient's size, so rounding differences of processors grow with the steps
@@ -86,15 +95,13 @@ def test_golden(folder: Path, tmp_path: Path, golden: Golden) -> None:
 def test_finds_the_known_material(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "material.npz"
     distill(folder / "conditions", out, options(folder, steps=400))
-    material = load_npz(out, MATERIAL)
-    field = MaterialField.from_arrays(material.provenance.extra["field"], material.arrays)
     views = Views(folder / "conditions")
     seen = [views.surface(view, np.arange(len(views.pixels(view)))).points for view in views.seen]
     points = torch.cat(seen)
     eyes = np.repeat(views.c2w[views.seen, :3, 3], [len(s) for s in seen], 0)
     truth, _ = TexturedModel(folder / "sphere.glb", np.eye(4)).material_at(points.numpy(), eyes)
     away = abs(points[:, 2].numpy()) > 0.06  # the step between dielectric and metal is finer than the views
-    found = field(points)
+    found = learnt_at(out, points)
     roughness = found.roughness.detach().numpy()[:, None]
     error = np.concatenate([found.albedo.detach().numpy(), roughness], 1) - truth[:, :4]
     assert np.sqrt((error[away, :3] ** 2).mean()) < 0.025
@@ -222,7 +229,7 @@ def test_per_step_cost_is_in_the_run_log(folder: Path, tmp_path: Path) -> None:
     out = tmp_path / "material.npz"
     distill(folder / "conditions", out, options(folder, steps=2))
     log = (tmp_path / "material.npz.run.json").read_text()
-    assert all(part in log for part in ("data", "field", "shading", "guidance", "backward", "optimiser"))
+    assert all(part in log for part in ("data", "recipe", "residual", "shading", "guidance", "backward", "optimiser"))
 
 
 @pytest.mark.parametrize("guidance", ["prior", "reference"])

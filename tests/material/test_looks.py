@@ -18,12 +18,12 @@ def test_a_look_is_a_material(name: str) -> None:
     found = LOOKS[name](at)
     for channel in (*found.color, found.roughness, found.metallic, found.height, found.dye):
         assert np.isfinite(channel).all()
-    assert -0.02 < found.color.min() and found.color.max() < 1.6  # clamped to [0, 1] where it is used
+    assert found.color.min() > -0.02 and found.color.max() < 1.6  # clamped to [0, 1] where it is used
     albedo = np.clip(found.color, 0, 1).mean(1)
     metal = np.mean(found.metallic) > 0.5
     assert 0.008 < luminance(albedo) < (0.999 if metal else 0.93)
     for channel in (found.roughness, found.metallic, found.dye):
-        assert -0.3 < np.min(channel) and np.max(channel) < 1.3 and 0 <= np.mean(channel) <= 1
+        assert np.min(channel) > -0.3 and np.max(channel) < 1.3 and 0 <= np.mean(channel) <= 1
     assert abs(np.asarray(found.height)).max() < 0.06  # metres
 
 

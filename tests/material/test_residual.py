@@ -119,7 +119,7 @@ def test_it_stays_in_range_and_finds_back_from_beyond_the_ends() -> None:
     for value in (-9.0, -0.5, 0.5, 9.0):
         added = torch.full((1, 5), value, requires_grad=True)
         found = combined(base, added)
-        assert 0 <= float(found.detach().min()) and float(found.detach().max()) <= 1
+        assert float(found.detach().min()) >= 0 and float(found.detach().max()) <= 1
         (slope,) = torch.autograd.grad(found.sum(), added)
         assert (slope > 0).all()
 

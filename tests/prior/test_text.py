@@ -3,13 +3,13 @@ import pytest
 import torch
 from numpy.random import default_rng
 
+from stages.prior.colors import COLORS
 from stages.prior.model import VOCABULARY_FILE
+from stages.prior.names import OBJECTS, SUBSTANCES
 from stages.prior.patterns import PATTERNS
 from stages.prior.recipe import LAYOUTS
 from stages.prior.text import MAX_WORDS, Reading, TextEmbedding, TextEncoder, Vocabulary, split_words
 from stages.train.captions import template_words
-from stages.prior.colors import COLORS
-from stages.prior.names import OBJECTS, SUBSTANCES
 
 
 @pytest.fixture(scope="module")

@@ -8,14 +8,14 @@ import pytest
 import trimesh
 
 from stages.light.scene import Scene
+from stages.prior.colors import WORDS
 from stages.prior.model import VOCABULARY_FILE
+from stages.prior.names import FINISHES, OBJECTS, SUBSTANCES
 from stages.prior.text import Vocabulary
 from stages.report import prior
 from stages.report.options import PriorReportOptions
 from stages.report.prompts import IDENTIFIED, PROMPTS, Meaning, Prompt
 from stages.report.shapes import SHAPES
-from stages.prior.colors import WORDS
-from stages.prior.names import FINISHES, OBJECTS, SUBSTANCES
 
 
 def test_the_list_is_as_long_and_as_new_as_it_claims() -> None:

@@ -12,7 +12,7 @@ from stages.bake.options import BakeOptions
 from stages.bake.stage import bake
 from stages.core.errors import InputError
 from stages.report.transfer import report_transfer
-from tests.bake.examples import constant_field, cube, save_material, save_prep
+from tests.bake.examples import constant, cube, save_material, save_prep
 
 LEFT, RIGHT = (0.5, 0.3, 0.1, 0.4, 0.1), (0.5, 0.3, 0.2, 0.6, 0.9)
 
@@ -22,7 +22,7 @@ def assets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("transfer")
     save_prep(folder / "prep.npz", cube())
     for name, values in (("left", LEFT), ("right", RIGHT)):
-        save_material(folder / f"{name}.npz", folder / "prep.npz", constant_field(values))
+        save_material(folder / f"{name}.npz", folder / "prep.npz", constant(values))
         bake(folder / "prep.npz", folder / f"{name}.npz", folder / name, BakeOptions(512, 1, 64))
     return folder
 

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from numpy.random import default_rng
 
+from stages.prior.colors import WORDS
+from stages.prior.names import HELD_OUT, SUBSTANCES
 from stages.prior.recipe import LAYOUTS
 from stages.prior.text import split_words
 from stages.train import materials
 from stages.train.captions import COMPOSED, Words, caption
-from stages.prior.colors import WORDS
-from stages.prior.names import HELD_OUT, SUBSTANCES
 from tests.prior.test_recipe import sphere
 
 

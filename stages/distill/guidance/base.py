@@ -45,9 +45,8 @@ class Guidance(Protocol):
 
     sampler: draws what this guidance wants to see. identity: name and what identifies its model or target (JSON types).
     inputs: role -> SHA-256 of the files it was made from. recipe: what the words alone call for, to which a run adds what it
-    learns. held: whether what is learnt is held near to it. budget: what it calls for where the options leave it open. weights: of
-    its score, or None where it has none.
-    """
+    learns. held: whether what is learnt is held near to it. budget: what it calls for where the options leave it open.
+    weights: of its score, or None where it has none. """
 
     @property
     def sampler(self) -> Sampler: ...

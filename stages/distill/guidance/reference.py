@@ -16,7 +16,7 @@ from stages.distill import schedule
 from stages.distill.guidance.base import Budget, Response
 from stages.distill.sampling import PixelSampler, Sample
 from stages.light.textured_model import TexturedModel
-from stages.material.recipe import PLAIN
+from stages.material.recipe import EVEN
 
 PIXELS = 1024
 """Pixels a step for each image of the batch: many small steps get further in a given time than few large ones."""
@@ -57,7 +57,7 @@ class ReferenceGuidance:
         self.sampler = sampler
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
-        self.recipe, self.held = PLAIN, False
+        self.recipe, self.held = EVEN, False
         self.budget, self.weights = BUDGET, None
         self._found = torch.from_numpy(found)
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)

@@ -23,7 +23,7 @@ from stages.distill.guidance.view_words import VIEW_WORDS, words_of
 from stages.distill.options import DistillOptions
 from stages.distill.sampling import CropSampler, Images, Sample
 from stages.distill.views import Views
-from stages.material.recipe import PLAIN
+from stages.material.recipe import EVEN
 from stages.sd import profile
 from stages.sd.files import ModelFiles
 from stages.sd.models import StableDiffusion
@@ -50,7 +50,7 @@ class StableDiffusionGuidance:
         self.sampler = sampler
         self.identity: dict[str, Any] = model.identity
         self.inputs: dict[str, str] = model.hashes
-        self.recipe, self.held = PLAIN, False
+        self.recipe, self.held = EVEN, False
         self.budget, self.weights = BUDGET, chosen_weights(options, CSD)
         self._model, self._given = model, options.given
         prompts = [f"{options.prompt}, {words}" for words in VIEW_WORDS]

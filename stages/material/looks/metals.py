@@ -6,15 +6,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stages.material.look import Look, mix, palette, shade, tint
+from stages.material.look import Look, Substance, mix, palette, shade, tint
 from stages.material.patterns import (
-    Array, Spectrum, cells, fading, fbm, line, marks, masked, noise, spots, threshold, warped,
+    Array,
+    Spectrum,
+    cells,
+    fading,
+    fbm,
+    line,
+    marks,
+    masked,
+    noise,
+    spots,
+    warped,
 )  # fmt: skip
 from stages.material.place import Place
 
 
 class Metal(NamedTuple):
-    """colors: normal reflectance, sRGB, darker to lighter. roughness: mean. tarnish: colours of what dulls it. dull: how much."""
+    """colors: normal reflectance, sRGB, darker to lighter. roughness: mean. tarnish: colours of what dulls it. dull: how
+    much."""
 
     colors: tuple[str, ...]
     roughness: float = 0.28
@@ -148,11 +159,11 @@ def foil(at: Place, kind: Metal) -> Look:
                 0.03 * tilt + 0.03 * tilt_small - 1e-5 * np.clip(crease, 0, 1))  # fmt: skip
 
 
-FINISHES: dict[str, Callable[[Place, Metal], Look]] = {
+FINISHES: dict[str, Callable[..., Look]] = {
     "": rolled, "brushed": brushed, "polished": polished, "cast": cast, "hammered": hammered, "machined": machined,
 }  # fmt: skip
 
-LOOKS = {
+LOOKS: dict[str, Substance] = {
     f"{finish} {metal}".strip(): partial(make, kind=kind) for metal, kind in METALS.items() for finish, make in FINISHES.items()
 }
 LOOKS |= {"galvanised steel": galvanised, "gold leaf": partial(foil, kind=METALS["gold"]),

@@ -4,7 +4,18 @@ import numpy as np
 
 from stages.material.look import Look, palette, shade, tint
 from stages.material.patterns import (
-    Array, Spectrum, cells, fading, fbm, line, marks, masked, noise, spots, warped, weave,
+    Array,
+    Spectrum,
+    cells,
+    fading,
+    fbm,
+    line,
+    marks,
+    masked,
+    noise,
+    spots,
+    warped,
+    weave,
 )  # fmt: skip
 from stages.material.place import Place
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from stages.material.look import Look, mix, palette, shade, tint
-from stages.material.patterns import Spectrum, cells, fading, fbm, masked, noise, spots, threshold, warped
+from stages.material.patterns import Spectrum, fading, fbm, masked, noise, spots, warped
 from stages.material.place import Place
 
 

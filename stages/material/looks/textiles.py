@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stages.material.look import Look, mix, palette, shade, tint
+from stages.material.look import Look, mix, palette, shade
 from stages.material.patterns import Spectrum, fbm, noise, weave
 from stages.material.place import Place
 

@@ -5,14 +5,13 @@ from typing import NamedTuple
 import numpy as np
 
 from stages.material.look import Look, palette, shade, tint
-from stages.material.patterns import Spectrum, cells, fading, fbm, line, noise, threshold, tiles, warped
+from stages.material.patterns import Spectrum, cells, fading, fbm, line, noise, threshold, tiles
 from stages.material.place import Place
 
 
 class Timber(NamedTuple):
-    """colors: early- to latewood, sRGB. ring: mean width of a ring, metres. contrast: of the rings. pores: how dark they are. pore: their
-    width, metres. figure: how far rings wander, metres. roughness: mean.
-    """
+    """colors: early- to latewood, sRGB. ring: mean width of a ring, metres. contrast: of the rings. pores: how dark they are.
+    pore: their width, metres. figure: how far rings wander, metres. roughness: mean. """
 
     colors: tuple[str, ...]
     ring: float = 0.004
