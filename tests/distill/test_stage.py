@@ -16,7 +16,7 @@ from stages.core.artifact import load_npz, peek
 from stages.core.errors import ArtifactError, InputError, NumericalError
 from stages.core.schemas import MATERIAL
 from stages.core.shading import Material
-from stages.distill import checkpoint, stage, start
+from stages.distill import checkpoint, stage
 from stages.distill.guidance import reference
 from stages.distill.guidance.base import Budget, Response
 from stages.distill.options import DistillOptions
@@ -245,7 +245,6 @@ def test_bytes_do_not_depend_on_the_number_of_threads(
         return drawn(self, generator)
 
     monkeypatch.setattr(CropSampler if guidance == "prior" else PixelSampler, "draw", draw)
-    monkeypatch.setattr(start, "STEPS", 4)
     written = []
     for threads in (1, 2, 3):
         monkeypatch.setattr(parallel, "cores", lambda threads=threads: threads)
