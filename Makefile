@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 RUN    := $(VENV)/bin
 DREAMMAT := $(RUN)/dreammat
+INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 VALIDATOR := $(VENV)/.validator
 DIFFUSION := $(VENV)/.diffusion
 MITSUBA := $(VENV)/.mitsuba
@@ -32,15 +33,15 @@ help:  ## show this list
 
 setup: $(VENV)/.ready  ## make the virtual environment and install everything into it
 
-$(VENV)/.ready: pyproject.toml
+$(VENV)/.ready: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "dreammat needs Python 3.10 or newer")'
 	$(PYTHON) -m venv $(VENV)
-	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,report]'
+	$(INSTALL) --editable '.[dev,report]'
 	@touch $@
 
 # the packages of --guidance sd, which its tests run on a tiny model
-$(DIFFUSION): pyproject.toml | $(VENV)/.ready
-	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sd]'
+$(DIFFUSION): pyproject.toml constraints.txt | $(VENV)/.ready
+	$(INSTALL) --editable '.[sd]'
 	@touch $@
 
 # the Khronos glTF validator, where npm can get it; its test says so and skips otherwise
