@@ -37,6 +37,12 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "dreammat needs Python 3.10 or newer")'
 	$(PYTHON) -m venv $(VENV)
 	$(INSTALL) --editable '.[dev,report]'
+	@echo "compiling kernels once, for all runs to come"
+	@tiny=$$(mktemp -d) && $(RUN)/python examples/urn.py $$tiny/urn.obj && \
+	$(DREAMMAT) prep $$tiny/urn.obj -o $$tiny/prep.npz -q && \
+	$(DREAMMAT) conditions $$tiny/prep.npz -o $$tiny/conditions --views 1 --size 64 -q && \
+	$(DREAMMAT) distill $$tiny/conditions --prompt copper --steps 1 -o $$tiny/material.npz -q && \
+	$(DREAMMAT) bake $$tiny/prep.npz $$tiny/material.npz -o $$tiny/asset --size 512 -q && rm -r $$tiny
 	@touch $@
 
 # the packages of --guidance sd, which its tests run on a tiny model

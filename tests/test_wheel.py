@@ -1,6 +1,6 @@
 """The wheel of this tree, installed apart from it, holds all that it needs and goes from a mesh to textures.
 
-Other packages are those of the running environment: what the wheel asks for is checked by its metadata, not by another download.
+Other packages are those of the running environment, so that nothing is downloaded.
 """
 
 import os
