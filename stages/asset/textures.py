@@ -17,7 +17,7 @@ from stages.asset.maps import Maps
 from stages.core.artifact import write_exr
 from stages.core.color import srgb_decode
 from stages.core.images import write_png
-from stages.core.jit import in_parallel
+from stages.core.parallel import in_parallel
 
 PNG_LEVEL = 3
 """zlib's level: within 2 % of the bytes of level 6, in two thirds of the time."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.jit import compiled
+from stages.core.parallel import compiled
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.field import HASH_PRIMES, OUTPUTS, MaterialField
-from stages.core.jit import compiled, in_parallel
+from stages.core.parallel import compiled, in_parallel
 
 BLOCK = 256
 """Points that go through the network at a time."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.bake.raster import Layout, Surface
-from stages.core.jit import compiled
+from stages.core.parallel import compiled
 from stages.light.normal_maps import NormalMaps, frame
 
 FAR = 4.0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from stages.bake.raster import Surface
 from stages.core.frames import project
-from stages.core.jit import in_parallel
+from stages.core.parallel import in_parallel
 from stages.light.scene import OFFSET, Scene
 
 GRID = 512

@@ -11,7 +11,7 @@ Convention: `w` is the sign of the bitangent, b = w cross(n, t), and b points wh
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.jit import compiled
+from stages.core.parallel import compiled
 
 _TINY = np.finfo(np.float32).tiny
 
