@@ -6,6 +6,7 @@ which five megabytes may stand for as many gigabytes, is another program's work.
 """
 
 import struct
+import tokenize
 import zipfile
 from collections.abc import Collection
 from pathlib import Path
@@ -13,7 +14,10 @@ from pathlib import Path
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-UNREADABLE = (ValueError, EOFError, KeyError, NotImplementedError, RuntimeError, struct.error, zipfile.BadZipFile)
+UNREADABLE = (
+    ValueError, TypeError, SyntaxError, EOFError, KeyError, OverflowError, NotImplementedError, RuntimeError,
+    struct.error, tokenize.TokenError, zipfile.BadZipFile,
+)  # fmt: skip
 """What zipfile and NumPy raise when they are given another kind of file, or a damaged one."""
 
 _HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}

@@ -317,7 +317,7 @@ def write_manifest(folder: Path, schema: Schema, provenance: Provenance, files: 
     """Complete a folder artefact: record provenance, the SHA-256 of each of its files (relative paths), and its own."""
     hashes = {name: sha256_file(folder / name) for name in sorted(files)}
     content = {**_header(schema, provenance), "files": hashes}
-    write_json(folder / schema.manifest, {**content, SEAL: _seal(content)})
+    write_json(folder / schema.manifest, {**content, SEAL: seal_of(content)})
 
 
 def read_manifest(folder: Path, schema: Schema) -> tuple[Provenance, dict[str, str]]:
@@ -334,7 +334,7 @@ def read_manifest(folder: Path, schema: Schema) -> tuple[Provenance, dict[str, s
     except ValueError as error:
         raise ArtifactError(f"{path}: not readable ({error}); make it again with the stage before") from error
     provenance = _provenance(path, schema, header)
-    if header.pop(SEAL, None) != _seal(header):
+    if header.pop(SEAL, None) != seal_of(header):
         raise ArtifactError(f"{path}: changed since it was written; make it again with the stage before")
     files = header.get("files")
     if not isinstance(files, dict):
@@ -348,7 +348,7 @@ def read_manifest(folder: Path, schema: Schema) -> tuple[Provenance, dict[str, s
     return provenance, files
 
 
-def _seal(content: dict[str, Any]) -> str:
+def seal_of(content: dict[str, Any]) -> str:
     """SHA-256 of a manifest's content, so that a flipped bit in a name or number does not pass for another request."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
@@ -468,3 +468,12 @@ def read_exr(path: Path) -> ExrImage:
         raise ArtifactError(f"{path}: its data window is not within its display window; make it again")
     attributes = {attribute.name: attribute.value for attribute in spec.extra_attribs}
     return ExrImage(pixels, spec.channelnames, (top, left), (spec.full_height, spec.full_width), attributes)
+
+
+def is_readable_exr(path: Path) -> bool:
+    """Whether a file is there of which every pixel can be read."""
+    try:
+        read_exr(path)
+    except ArtifactError:
+        return False
+    return True

@@ -32,6 +32,9 @@ LARGEST_STORED = 32768.0
 """Stored radiance stays at or under this, well inside half float's range."""
 
 
+LARGEST_VIEW = 4096
+"""Pixels along a side of the largest view that `conditions` makes."""
+
 DROPPED = 3
 """Bits of a half float's significand that are not stored: what is left errs by 0.2 % and packs a third smaller."""
 
@@ -77,6 +80,8 @@ def read_geometry(folder: Path, view: int, profile: str = "", files: Mapping[str
     image = read_exr(path)
     names = ["depth", "mask", *(f"normal.{c}" for c in "RGB")]
     _expect(path, image, names)
+    if max(image.display) > LARGEST_VIEW:
+        raise ArtifactError(f"{path}: announces {image.display[1]} x {image.display[0]} pixels; make the conditions again")
     depth, mask, *normal = (image.full(name) for name in names)
     return Geometry(mask > 0.5, depth, np.stack(normal, -1))
 

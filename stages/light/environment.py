@@ -14,10 +14,7 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import reason, write_exr
 from stages.core.errors import InputError
-from stages.light.exr_light import read_exr_light
 from stages.light.radiance_file import read_radiance
-
-READERS = {".hdr": read_radiance, ".pic": read_radiance, ".exr": read_exr_light}
 
 MAX_REPAIRED = 0.01
 """A file of which more than this share of pixels is not usable radiance is refused, not mended."""
@@ -77,15 +74,18 @@ def save_environment(path: Path, environment: Environment) -> None:
 
 def _read(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:
     """Pixels (H, W, 3) as stored, and the matrix to linear Rec. 709 or None. Raises: InputError."""
-    reader = READERS.get(path.suffix.lower())
+    from stages.light.exr_light import read_exr_light  # compiled functions keep this module's names, and OpenImageIO minds
+
     if not path.is_file():
         raise InputError(f"{path}: no such file; expected a .hdr or .exr environment")
-    if reader is None:
-        raise InputError(f"{path}: a '{path.suffix}' file, expected .hdr or .exr")
     try:
-        return reader(path)
+        if path.suffix.lower() == ".exr":
+            return read_exr_light(path)
+        if path.suffix.lower() in (".hdr", ".pic"):
+            return read_radiance(path)
     except OSError as error:
         raise InputError(f"{path}: {reason(error)}") from error
+    raise InputError(f"{path}: a '{path.suffix}' file, expected .hdr or .exr")
 
 
 def directions_of_texels(height: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -11,12 +11,12 @@ import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.artifact import reason
+from stages.core.beside import beside
 from stages.core.errors import InputError
 from stages.prep.source import Part, Source, check_range, polygons
 
@@ -84,7 +84,7 @@ def companions(path: Path) -> dict[str, Path]:
     """Files beside a .gltf that hold its buffers: URI -> path. Raises: InputError."""
     buffers = _open(path).root.get("buffers", [])
     uris = [buffer["uri"] for buffer in buffers if isinstance(buffer, dict) and isinstance(buffer.get("uri"), str)]
-    return {uri: path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")}
+    return {uri: beside(path, uri) for uri in uris if not uri.startswith("data:")}
 
 
 # ---------------------------------------------------------------------------------------------------- container
@@ -146,7 +146,7 @@ def _buffer(gltf: _Gltf, index: int) -> bytes:
 
 def _read_beside(path: Path, uri: str) -> bytes:
     try:
-        return (path.parent / unquote(uri)).read_bytes()
+        return beside(path, uri).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: its buffer {uri}: {reason(error)}; keep the file beside it") from None
 

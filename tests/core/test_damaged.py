@@ -1,4 +1,4 @@
-"""Artefacts that are damaged, foreign or hostile: one line says which file, and no more memory is taken than files have bytes."""
+"""Artefacts that are damaged, foreign or hostile: one line says which, and no more memory is taken than files have bytes."""
 
 import io
 import json
@@ -107,6 +107,7 @@ def test_names_that_lead_elsewhere(tmp_path: Path, name: str) -> None:
 def test_pickles_other_formats_and_nested_headers(tmp_path: Path) -> None:
     refusal(repacked(tmp_path / "object.npz", {"points.npy": npy((2,), "|O", b"\x80\4N.")}))
     refusal(repacked(tmp_path / "noise.npz", {"points.npy": b"no array"}))
+    refusal(repacked(tmp_path / "text.npz", {"points.npy": npy((2,), "<f4", b"").replace(b"(2,)", b"((2,")}))
     deep = "[" * 100_000
     refusal(repacked(tmp_path / "deep.npz", {"header.npy": npy((), f"<U{len(deep)}", deep.encode("utf-32-le"))}))
     (tmp_path / "deep.json").write_text(deep)
