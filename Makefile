@@ -26,7 +26,7 @@ BAKE_OPTIONS       ?=
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup demo test lint asset batch bench clean
+.PHONY: help setup demo test campaign lint asset batch bench clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -104,6 +104,9 @@ batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: mak
 
 test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
+
+campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.campaign --reads 1000 --damages 100 --kills 100
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .

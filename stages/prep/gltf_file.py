@@ -1,14 +1,15 @@
 """A glTF 2.0 file taken apart: its JSON, and the bytes that its buffers and images lie in."""
 
 import base64
+import contextlib
 import json
 import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 from stages.core.artifact import reason
+from stages.core.beside import beside
 from stages.core.errors import InputError
 
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_mesh_quantization",
@@ -88,7 +89,7 @@ def buffer_bytes(gltf: Gltf, index: int) -> bytes:
 
 def read_beside(path: Path, uri: str) -> bytes:
     try:
-        return (path.parent / unquote(uri)).read_bytes()
+        return beside(path, uri).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: its buffer {uri}: {reason(error)}; keep the file beside it") from None
 
@@ -101,7 +102,6 @@ def companions(path: Path) -> dict[str, Path]:
         for entry in root.get(kind, []):
             uri = entry.get("uri") if isinstance(entry, dict) else None
             if isinstance(uri, str) and not uri.startswith("data:"):
-                beside = path.parent / unquote(uri)
-                if kind == "buffers" or beside.is_file():
-                    found[uri] = beside
+                with contextlib.nullcontext() if kind == "buffers" else contextlib.suppress(InputError):
+                    found[uri] = beside(path, uri)
     return found

@@ -3,8 +3,8 @@
 import base64
 from collections.abc import Callable
 from typing import Any
-from urllib.parse import unquote
 
+from stages.core.beside import beside
 from stages.core.errors import InputError
 from stages.core.images import decode_image
 from stages.prep.gltf_file import Gltf, buffer_bytes
@@ -107,5 +107,7 @@ def _image(gltf: Gltf, index: int) -> bytes | None:
     uri = image["uri"]
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])
-    beside = gltf.path.parent / unquote(uri)
-    return beside.read_bytes() if beside.is_file() else None
+    try:
+        return beside(gltf.path, uri).read_bytes()
+    except InputError:
+        return None
