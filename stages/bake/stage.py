@@ -30,6 +30,7 @@ from stages.core.artifact import (
     load_npz,
     peek,
     plain_options,
+    read_json,
     read_manifest,
     reason,
     run_log,
@@ -120,13 +121,19 @@ def bake(
 
 
 def open_folder(out: Path) -> None:
-    """Make the folder; where it holds an earlier asset, take that away, its manifest first. Raises: OutputError."""
+    """Make the folder; where it holds an earlier asset, of whatever version, take that away, its manifest first.
+
+    Raises: OutputError, also where a file of another program has the manifest's name.
+    """
+    manifest = out / ASSET.manifest
+    old = read_json(manifest) or {}
+    if manifest.exists() and not (isinstance(old, dict) and old.get("schema") == ASSET.name):
+        raise OutputError(f"{manifest}: not a file of dreammat's; give another folder, or move that file away")
     try:
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()
-        old = read_manifest(out, ASSET)[1] if peek(out, ASSET) else {}
-        (out / ASSET.manifest).unlink(missing_ok=True)
-        for name in old:
+        manifest.unlink(missing_ok=True)
+        for name in old.get("files") or {}:
             (out / Path(name).name).unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{out}: cannot be written: {reason(error)}; give a folder that can") from error

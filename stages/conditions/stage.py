@@ -17,6 +17,7 @@ from stages.conditions.predict import choose_quality
 from stages.core.artifact import (
     MANIFEST,
     Provenance,
+    is_readable_exr,
     load_npz,
     peek,
     plain_options,
@@ -174,8 +175,8 @@ def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: Cond
 
 
 def view_is_there(out: Path, view: int, names: tuple[str, ...], options: ConditionsOptions) -> bool:
-    """Whether every file of a view has been written; each is renamed into place when whole."""
-    return all((out / name).is_file() for name in view_files(view, names, options))
+    """Whether every file of a view has been written, and none of them damaged since: no manifest tells of it yet."""
+    return all(is_readable_exr(out / name) for name in view_files(view, names, options))
 
 
 def view_files(view: int, names: tuple[str, ...], options: ConditionsOptions) -> list[str]:

@@ -31,13 +31,25 @@ def mikktspace(
     if not len(p):
         return result
     bits = np.concatenate([(values.reshape(3 * len(p), -1) + np.float32(0)).view(np.uint32) for values in (p, n, t)], 1)
-    vertex = np.unique(bits, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    vertex = _same_rows(bits).reshape(-1, 3)
     direction, preserving, usable = _face_tangents(p, t)
     thin = (p == np.roll(p, 1, 1)).all(2).any(1)  # two of whose corners are one point
     neighbour = _neighbours(np.where(thin[:, None], -1, vertex))
     _gather(p, n, vertex, direction, preserving, usable, thin, neighbour, result)
     _lend(vertex, thin, result)
     return result
+
+
+def _same_rows(bits: NDArray[np.uint32]) -> NDArray[np.int64]:
+    """One number for equal rows. Args: (N, K). Returns: (N,). By a hash of the rows, which is a tenth of the time."""
+    mixed = np.zeros(len(bits), np.uint64)
+    for column in bits.T:
+        mixed = (mixed ^ column) * np.uint64(0x9E3779B97F4A7C15)
+        mixed ^= mixed >> np.uint64(29)
+    _, first, number = np.unique(mixed, return_index=True, return_inverse=True)
+    if (bits[first[number]] == bits).all():
+        return number
+    return np.unique(bits, axis=0, return_inverse=True)[1].reshape(-1)  # two rows met by chance
 
 
 def _face_tangents(p: NDArray, uv: NDArray) -> tuple[NDArray[np.float32], NDArray[np.bool_], NDArray[np.bool_]]:

@@ -6,46 +6,21 @@ part is one primitive of one mesh on one node; vertices keep the order of their 
 Skins, morph targets and animations are counted and left out: the mesh is taken as stored.
 """
 
-import base64
-import json
-import struct
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.artifact import reason
 from stages.core.errors import InputError
-from stages.prep.source import Part, Source, check_range, nothing_passed_on, polygons
+from stages.prep.gltf_file import Gltf, buffer_bytes, open_gltf
+from stages.prep.gltf_textures import material_name, pass_on
+from stages.prep.source import Part, Source, check_range, polygons
 
 _COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
-_SIGNATURES = {b"\x89PNG\r\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
-TRANSFORM = "KHR_texture_transform"
 _POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
-_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_mesh_quantization",
-             "KHR_animation_", "KHR_xmp", "KHR_node_visibility")  # fmt: skip
-
-
-@dataclass
-class _Gltf:
-    """The parsed file. buffers: bytes by index, read when first asked for."""
-
-    path: Path
-    root: dict[str, Any]
-    chunk: bytes | None
-    buffers: dict[int, bytes] = field(default_factory=dict)
-
-    def item(self, kind: str, index: Any) -> dict[str, Any]:
-        """Entry `index` of the top-level array `kind`. Raises: InputError."""
-        entries = self.root.get(kind, [])
-        if not isinstance(index, int) or not 0 <= index < len(entries):
-            raise InputError(f"{self.path}: refers to {kind}[{index}], but has {len(entries)}; export it again")
-        return entries[index]
 
 
 @dataclass
@@ -68,7 +43,7 @@ class _Geometry:
 
 def read_gltf(path: Path) -> Source:
     """Read a .glb or .gltf file. Raises: InputError."""
-    gltf = _open(path)
+    gltf = open_gltf(path)
     try:
         geometry = _gather(gltf)
         passed_on, images = pass_on(gltf, geometry.skip)
@@ -87,88 +62,10 @@ def read_gltf(path: Path) -> Source:
     )  # fmt: skip
 
 
-def companions(path: Path) -> dict[str, Path]:
-    """Files beside a .gltf that hold its buffers, and those of its images that are there: URI -> path. Raises: InputError."""
-    root = _open(path).root
-    found: dict[str, Path] = {}
-    for kind in ("buffers", "images"):
-        for entry in root.get(kind, []):
-            uri = entry.get("uri") if isinstance(entry, dict) else None
-            if isinstance(uri, str) and not uri.startswith("data:"):
-                beside = path.parent / unquote(uri)
-                if kind == "buffers" or beside.is_file():
-                    found[uri] = beside
-    return found
-
-
-# ---------------------------------------------------------------------------------------------------- container
-
-
-def _open(path: Path) -> _Gltf:
-    data = path.read_bytes()
-    text, chunk = _chunks(data, path) if data.startswith(b"glTF") else (data, None)
-    try:
-        root = json.loads(text)
-    except ValueError as error:
-        raise InputError(
-            f"{path}: neither GLB nor glTF JSON ({error}); it is cut off or another kind of file"
-        ) from None
-    version = root.get("asset", {}).get("version") if isinstance(root, dict) else None
-    if not str(version).startswith("2."):
-        raise InputError(f"{path}: glTF version {version}, expected 2.0; export it again")
-    foreign = [name for name in root.get("extensionsRequired", []) if not name.startswith(_HARMLESS)]
-    if foreign:
-        raise InputError(f"{path}: needs the glTF extension {foreign[0]}, which is not read; export it without")
-    return _Gltf(path, root, chunk)
-
-
-def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
-    """JSON and binary chunk of a GLB."""
-    length = struct.unpack_from("<I", data, 8)[0] if len(data) >= 20 else len(data) + 1
-    if length > len(data):
-        raise InputError(f"{path}: {len(data)} bytes, but its header announces {length}; it is cut off")
-    chunks: dict[bytes, bytes] = {}
-    offset = 12
-    while offset + 8 <= length:
-        size, kind = struct.unpack_from("<I4s", data, offset)
-        chunks.setdefault(kind, data[offset + 8 : offset + 8 + size])
-        offset += 8 + size
-    if b"JSON" not in chunks or offset > length:
-        raise InputError(f"{path}: its GLB chunks are damaged; export it again")
-    return chunks[b"JSON"], chunks.get(b"BIN\0")
-
-
-def _buffer(gltf: _Gltf, index: int) -> bytes:
-    if index not in gltf.buffers:
-        entry = gltf.item("buffers", index)
-        uri = entry.get("uri")
-        if uri is None and gltf.chunk is not None:
-            data = gltf.chunk
-        elif uri is None:
-            raise InputError(f"{gltf.path}: buffer {index} has neither a URI nor a binary chunk; export it again")
-        elif uri.startswith("data:"):
-            data = base64.b64decode(uri.partition(",")[2])
-        else:
-            data = _read_beside(gltf.path, uri)
-        if len(data) < entry["byteLength"]:
-            raise InputError(
-                f"{gltf.path}: buffer {index} has {len(data)} of {entry['byteLength']} bytes; it is cut off"
-            )
-        gltf.buffers[index] = data
-    return gltf.buffers[index]
-
-
-def _read_beside(path: Path, uri: str) -> bytes:
-    try:
-        return (path.parent / unquote(uri)).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: its buffer {uri}: {reason(error)}; keep the file beside it") from None
-
-
 # ---------------------------------------------------------------------------------------------------- accessors
 
 
-def _accessor(gltf: _Gltf, index: int) -> NDArray:
+def _accessor(gltf: Gltf, index: int) -> NDArray:
     """An accessor's elements, (N, width), in the stored type; normalised integers become float32 (section 3.11)."""
     entry = gltf.item("accessors", index)
     dtype, width = np.dtype(_COMPONENTS[entry["componentType"]]), _WIDTHS[entry["type"]]
@@ -185,7 +82,7 @@ def _accessor(gltf: _Gltf, index: int) -> NDArray:
     return values
 
 
-def _view(gltf: _Gltf, index: int, offset: int, count: int, width: int, dtype: np.dtype) -> NDArray:
+def _view(gltf: Gltf, index: int, offset: int, count: int, width: int, dtype: np.dtype) -> NDArray:
     """`count` rows of a buffer view, honouring its stride."""
     view = gltf.item("bufferViews", index)
     if "EXT_meshopt_compression" in view.get("extensions", {}) and "uri" not in gltf.item("buffers", view["buffer"]):
@@ -195,14 +92,14 @@ def _view(gltf: _Gltf, index: int, offset: int, count: int, width: int, dtype: n
     row = width * dtype.itemsize
     stride = view.get("byteStride") or row
     start = view.get("byteOffset", 0) + offset
-    data = _buffer(gltf, view["buffer"])
+    data = buffer_bytes(gltf, view["buffer"])
     if count < 0 or start < 0 or (count and start + stride * (count - 1) + row > len(data)):
         raise InputError(f"{gltf.path}: bufferViews[{index}] reaches past the end of its buffer; export it again")
     strided = np.ndarray((count, row), np.uint8, data, start, (stride, 1)) if count else np.zeros((0, row), np.uint8)
     return np.ascontiguousarray(strided).view(dtype).reshape(count, width)
 
 
-def _sparse(gltf: _Gltf, sparse: dict[str, Any], values: NDArray) -> NDArray:
+def _sparse(gltf: Gltf, sparse: dict[str, Any], values: NDArray) -> NDArray:
     """Values with the sparse replacements of section 3.6.2.3."""
     at, new, count = sparse["indices"], sparse["values"], sparse["count"]
     dtype = np.dtype(_COMPONENTS[at["componentType"]])
@@ -213,99 +110,10 @@ def _sparse(gltf: _Gltf, sparse: dict[str, Any], values: NDArray) -> NDArray:
     return values
 
 
-# ---------------------------------------------------------------------------------------------------- materials
-
-
-def material_name(materials: list[dict[str, Any]], index: int) -> str:
-    """A material's name, with its number where it has none or shares it with another."""
-    name = materials[index].get("name")
-    if not name:
-        return f"material_{index}"
-    first = next(i for i, material in enumerate(materials) if material.get("name") == name)
-    return name if first == index else f"{name}_{index}"
-
-
-def pass_on(gltf: _Gltf, skip: Callable[[str], None]) -> tuple[dict[str, Any], list[bytes]]:
-    """What materials have besides colour, roughness and metallic, as `stages.asset.passed_on` wants it.
-
-    Textures of another UV set than the first, in files that are not there, or neither PNG nor JPEG are counted and left
-    out. Returns: the description; the images' bytes.
-    """
-    held, files, rows = nothing_passed_on(), list[bytes](), dict[int, int | None]()
-    for index, material in enumerate(gltf.root.get("materials", [])):
-        properties: dict[str, Any] = {}
-        for kind in ("normalTexture", "occlusionTexture", "emissiveTexture"):
-            info = material.get(kind)
-            if info is None:
-                continue
-            texture = info["index"]
-            if texture not in rows:
-                rows[texture] = _add_texture(gltf, texture, held, files, skip)
-            if uv_set(info) != 0:
-                skip("textures_of_other_uv_sets")
-            elif rows[texture] is not None:
-                properties[kind] = _kept_info(info) | {"index": rows[texture]}
-        if "emissiveFactor" in material and (material.get("emissiveTexture") is None or "emissiveTexture" in properties):
-            properties["emissiveFactor"] = material["emissiveFactor"]
-            strength = material.get("extensions", {}).get("KHR_materials_emissive_strength")
-            if strength is not None:
-                properties["extensions"] = {"KHR_materials_emissive_strength": strength}
-        if properties:
-            held["materials"][material_name(gltf.root["materials"], index)] = properties
-    return held, files
-
-
-def uv_set(info: dict[str, Any]) -> int:
-    """The UV set that a texture is laid out for; KHR_texture_transform has the last word."""
-    return info.get("extensions", {}).get(TRANSFORM, {}).get("texCoord", info.get("texCoord", 0))
-
-
-def _kept_info(info: dict[str, Any]) -> dict[str, Any]:
-    """A texture's reference with its scale or strength and its transform, and nothing that would need another extension."""
-    kept = {key: value for key, value in info.items() if key in ("texCoord", "scale", "strength")}
-    if TRANSFORM in info.get("extensions", {}):
-        kept["extensions"] = {TRANSFORM: info["extensions"][TRANSFORM]}
-    return kept
-
-
-def _add_texture(gltf: _Gltf, index: int, held: dict, files: list[bytes], skip: Callable[[str], None]) -> int | None:
-    """Take up a texture and its image. Returns: its row, or None where the image cannot be had."""
-    texture = gltf.item("textures", index)
-    data = _image(gltf, texture["source"]) if "source" in texture else None
-    kind = next((mime for start, mime in _SIGNATURES.items() if data and data.startswith(start)), None)
-    if data is None or kind is None:
-        skip("textures_missing" if data is None else "textures_not_png_or_jpeg")
-        return None
-    if data not in files:
-        files.append(data)
-        name = gltf.item("images", texture["source"]).get("name", "")
-        held["images"].append({"name": name, "mimeType": kind, "length": len(data)})
-    entry: dict[str, Any] = {"image": files.index(data)}
-    if "sampler" in texture:
-        sampler = gltf.item("samplers", texture["sampler"])
-        entry["sampler"] = {k: v for k, v in sampler.items() if k in ("magFilter", "minFilter", "wrapS", "wrapT")}
-    held["textures"].append(entry)
-    return len(held["textures"]) - 1
-
-
-def _image(gltf: _Gltf, index: int) -> bytes | None:
-    """The bytes of an image file, or None where there is none."""
-    image = gltf.item("images", index)
-    if "bufferView" in image:
-        view = gltf.item("bufferViews", image["bufferView"])
-        start = view.get("byteOffset", 0)
-        return _buffer(gltf, view["buffer"])[start : start + view["byteLength"]]
-    uri = image["uri"]
-    if uri.startswith("data:"):
-        return base64.b64decode(uri.partition(",")[2])
-    beside = gltf.path.parent / unquote(uri)
-    return beside.read_bytes() if beside.is_file() else None
-
-
 # ---------------------------------------------------------------------------------------------------- scene
 
 
-def _gather(gltf: _Gltf) -> _Geometry:
+def _gather(gltf: Gltf) -> _Geometry:
     """Walk the default scene (all root nodes where there is none), parents before children, in file order."""
     geometry = _Geometry()
     stack = [(index, np.eye(4)) for index in reversed(_roots(gltf))]
@@ -328,7 +136,7 @@ def _gather(gltf: _Gltf) -> _Geometry:
     return geometry
 
 
-def _roots(gltf: _Gltf) -> list[int]:
+def _roots(gltf: Gltf) -> list[int]:
     if gltf.root.get("scenes"):
         return list(gltf.item("scenes", gltf.root.get("scene", 0)).get("nodes", []))
     nodes = gltf.root.get("nodes", [])
@@ -352,7 +160,7 @@ def _local_transform(node: dict[str, Any]) -> NDArray[np.float64]:
     return matrix
 
 
-def _add_mesh(gltf: _Gltf, geometry: _Geometry, node_index: int, node: dict, transform: NDArray) -> None:
+def _add_mesh(gltf: Gltf, geometry: _Geometry, node_index: int, node: dict, transform: NDArray) -> None:
     mesh = gltf.item("meshes", node["mesh"])
     name = mesh.get("name") or f"mesh_{node['mesh']}"
     flat = tuple(float(x) for x in transform.reshape(-1))
@@ -376,7 +184,7 @@ def _add_mesh(gltf: _Gltf, geometry: _Geometry, node_index: int, node: dict, tra
         geometry.corners.append(tuple(np.where(first >= 0, first + flat_index, -1) for first in corners[:-1]))
 
 
-def _add_vertices(gltf: _Gltf, geometry: _Geometry, node: int, primitive: dict) -> tuple[int, ...]:
+def _add_vertices(gltf: Gltf, geometry: _Geometry, node: int, primitive: dict) -> tuple[int, ...]:
     """First rows of a primitive's positions, UVs, normals and tangents (-1: none) and their count.
 
     Primitives of one node that share their accessors share the rows.
@@ -407,7 +215,7 @@ def _add_vertices(gltf: _Gltf, geometry: _Geometry, node: int, primitive: dict) 
     return (*geometry.blocks[key], count)
 
 
-def _triangles(gltf: _Gltf, primitive: dict, mode: int, count: int) -> NDArray[np.int64]:
+def _triangles(gltf: Gltf, primitive: dict, mode: int, count: int) -> NDArray[np.int64]:
     """Vertex indices (T, 3) of a triangle list, strip or fan (section 3.7.2.1)."""
     indexed = "indices" in primitive
     index = _accessor(gltf, primitive["indices"])[:, 0].astype(np.int64) if indexed else np.arange(count)

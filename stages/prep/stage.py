@@ -12,11 +12,12 @@ from stages.core.artifact import Provenance, peek, plain_options, run_log, save_
 from stages.core.errors import InputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
+from stages.prep.gltf_file import companions
 from stages.prep.measure import topology
 from stages.prep.normals import authored, face_normals, shading_normals
 from stages.prep.options import PrepOptions
 from stages.prep.orient import outward
-from stages.prep.read_gltf import companions, read_gltf
+from stages.prep.read_gltf import read_gltf
 from stages.prep.read_obj import read_obj
 from stages.prep.read_off import read_off
 from stages.prep.read_ply import read_ply

@@ -173,19 +173,22 @@ def test_tangents_only_where_there_is_a_normal_map(tmp_path: Path) -> None:
     assert "TANGENT" in bumpy["attributes"] and "TANGENT" not in plain["attributes"]
 
 
-def test_other_uv_sets_foreign_formats_and_missing_files_are_counted(tmp_path: Path) -> None:
+def test_other_uv_sets_foreign_formats_missing_and_torn_files_are_counted(tmp_path: Path) -> None:
     built = Textured()
     good, foreign = built.image(png(tmp_path, LEANING)), built.image(b"RIFF....WEBP")
     built.root["images"].append({"uri": "gone.png"})
+    torn = built.image(png(tmp_path, LEANING)[:60])
     material = {
         "normalTexture": {"index": built.texture(good), "texCoord": 1},
         "occlusionTexture": {"index": built.texture(foreign)},
         "emissiveTexture": {"index": built.texture(2)},
         "emissiveFactor": [1, 1, 1],
     }
+    built.root["materials"] = [{"normalTexture": {"index": built.texture(torn)}}]
     mesh = prepared(built.quad(material), tmp_path)
     skipped = mesh.provenance.extra["findings"]["skipped"]
-    assert skipped == {"textures_of_other_uv_sets": 1, "textures_not_png_or_jpeg": 1, "textures_missing": 1}
+    assert skipped == {"textures_of_other_uv_sets": 1, "textures_not_png_or_jpeg": 1, "textures_missing": 1,
+                       "textures_damaged": 1}  # fmt: skip
     assert PassedOn.of(mesh).materials == {}
 
 

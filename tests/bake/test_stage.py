@@ -181,6 +181,25 @@ def test_another_request_replaces_the_folder_and_takes_its_old_files_away(tmp_pa
 
 
 @pytest.mark.usefixtures("no_preview")
+def test_an_asset_of_an_older_version_is_replaced_and_a_foreign_folder_is_not(tmp_path: Path) -> None:
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    out = tmp_path / "asset"
+    out.mkdir()
+    (out / "normal.png").write_text("of an older asset")
+    (out / "bake.json").write_text('{"schema": "dreammat.asset", "version": 1, "files": {"normal.png": "0"}}')
+    with pytest.raises(ArtifactError, match=r"bake\.json: dreammat\.asset version 1, expected 2; make it again"):
+        read_manifest(out, ASSET)
+    bake(prep, material, out, SMALL)
+    assert not (out / "normal.png").exists()
+    read_manifest(out, ASSET)
+    (out / "bake.json").write_text('{"oven": 200}')
+    with pytest.raises(OutputError, match=r"bake\.json: not a file of dreammat's; give another folder"):
+        bake(prep, material, out, SMALL)
+    assert (out / "bake.json").read_text() == '{"oven": 200}' and (out / "model.glb").exists()
+
+
+@pytest.mark.usefixtures("no_preview")
 def test_a_failure_leaves_no_manifest(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     prep = save_prep(tmp_path / "prep.npz", cube())
     material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from stages.core.errors import InputError
-from stages.prep.read_gltf import companions, read_gltf
+from stages.prep.gltf_file import companions
+from stages.prep.read_gltf import read_gltf
 from stages.prep.read_obj import read_obj
 from stages.prep.read_off import read_off
 from stages.prep.read_ply import read_ply
