@@ -173,12 +173,12 @@ def sine(x):  # type: ignore[no-untyped-def]
 
 
 class Strokes(NamedTuple):
-    """count: strokes a cell. length: half of the longest, in cells; with the width at most 1. vary: share by which others are
+    """number: strokes a cell. length: half of the longest, in cells; with the width at most 1. vary: share by which others are
     shorter. width: half of it, in cells. angle: of their direction, radians from x. spread: range of angles about it.
     bend: how far the ends leave the straight line, as a share of the length.
     """
 
-    count: int
+    number: int
     length: float
     vary: float
     width: float
@@ -210,7 +210,7 @@ def _strokes_block(x, y, face, period, shape, seed, distance, along, ident):  # 
     distance[:], along[:], ident[:] = np.float32(9), np.float32(0), np.uint32(0)
     for k in range(9):
         ax, ay = np.float32(k % 3 - 1), np.float32(k // 3 - 1)
-        for j in range(shape.count):
+        for j in range(shape.number):
             step = np.uint32(np.uint32(j) * np.uint32(0x9E3779B9))
             for i in range(len(x)):
                 cx, cy = np.floor(x[i]), np.floor(y[i])

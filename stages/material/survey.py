@@ -65,8 +65,10 @@ class Survey(NamedTuple):
     def from_arrays(arrays: dict[str, NDArray]) -> "Survey":
         """Of what `to_arrays` gave."""
         pieces = Pieces(*(arrays[f"pieces_{name}"] for name in Pieces._fields))
-        rows = (arrays[f"survey_{name}"].astype(np.float32) for name in ("point", "normal", "convexity", "occlusion"))
-        return Survey(*rows, arrays["survey_piece"], pieces)
+        point, normal, convex, hidden = (
+            arrays[f"survey_{name}"].astype(np.float32) for name in ("point", "normal", "convexity", "occlusion")
+        )
+        return Survey(point, normal, convex, hidden, arrays["survey_piece"], pieces)
 
 
 class Lookup:
@@ -189,7 +191,7 @@ def occlusion(point: Array, normal: Array, flat: Array, blocked: Blocked, rng: n
         angle = 2 * np.pi * ((k * golden + rng.random(len(point)) / RAYS) % 1)
         z, r = 1 - 2 * u, 2 * np.sqrt(u * (1 - u))
         direction = normal + np.stack([r * np.cos(angle), r * np.sin(angle), z], 1).astype(np.float32)  # cosine-weighted
-        hits += blocked(origin, direction)
+        hits += blocked(origin.astype(np.float32), direction.astype(np.float32))
     distance, index = cKDTree(point).query(point, 4, distance_upper_bound=REACH / 2)
     weight = np.where(np.isfinite(distance), 1.0, 0.0)
     near = np.where(np.isfinite(distance), index, 0)
@@ -197,6 +199,8 @@ def occlusion(point: Array, normal: Array, flat: Array, blocked: Blocked, rng: n
     return ((weight * hits[near]).sum(1) / np.maximum(weight.sum(1), 1) / RAYS).astype(np.float32)
 
 
-EMPTY = Survey(np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32), *np.zeros((2, 1), np.float32),
-               np.zeros(1, np.int32), WHOLE)  # fmt: skip
+_NOTHING = np.zeros(1, np.float32)
+EMPTY = Survey(
+    np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32), _NOTHING, _NOTHING, np.zeros(1, np.int32), WHOLE
+)
 """Of a thing of which nothing is known."""

@@ -75,7 +75,8 @@ def test_quality_multiplies_the_steps_and_steps_replace_it() -> None:
 def learnt_at(path: Path, points: torch.Tensor) -> Material:
     """The material of points (P, 3) by material.npz, the normals of a sphere's."""
     learnt = LearntMaterial.of(path, load_npz(path, MATERIAL))
-    surface = learnt.lookup.surface(points.numpy(), torch.nn.functional.normalize(points).numpy(), np.full(len(points), 1e-3, "f4"))
+    normals, footprint = torch.nn.functional.normalize(points), np.full(len(points), 1e-3, "f4")
+    surface = learnt.lookup.surface(points.numpy(), normals.numpy(), footprint)
     base = torch.from_numpy(evaluate(learnt.recipe, surface)[:, :5])
     return Material.of(combined(base, learnt.residual(points)))
 

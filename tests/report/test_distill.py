@@ -47,7 +47,7 @@ def test_report_on_a_tiny_model(tmp_path: Path) -> None:
     counted = {part.part: part for part in report.parts if part.gbyte > 0}
     assert len(counted) == 6 and all(part.of_peak_percent > 0 for part in counted.values())  # in a cache, memory has no peak
     denoise = counted[distill.NAMES["denoise"]]
-    assert denoise.gflop > counted[distill.NAMES["field"]].gflop > 0
+    assert denoise.gflop > counted[distill.NAMES["residual"]].gflop > 0
     with (tmp_path / "out" / "distill.csv").open() as stream:
         assert [row["part"] for row in csv.DictReader(stream)] == list(distill.NAMES.values())
     assert len(distill.summary(report)) == len(report.parts) + 3
