@@ -15,6 +15,7 @@ COMMANDS = {
     "conditions": "Ray-trace geometry and light around the mesh.",
     "distill": "Optimise the material for a prompt.",
     "bake": "Write textures and a model with the material.",
+    "material": "Write tiling maps of a material from a prompt alone.",
     "report": "Measure speed against error.",
     "train": "Train the diffusion models.",
     "eval": "Measure assets: CLIP score and FID.",

@@ -15,6 +15,7 @@ ALLOWED = {
     "prior": {"core", "material"},
     "sd": {"core"},
     "prep": {"core", "light", "material", "prior"},
+    "swatch": {"core", "light", "material", "prior", "asset"},
     "conditions": {"core", "light", "material", "prior", "asset"},
     "distill": {"core", "light", "material", "prior", "sd"},
     "bake": {"core", "light", "material", "prior", "asset"},

@@ -1,0 +1,143 @@
+"""preview.png of a swatch: a sphere and a tilted plate under three lights, and the tile itself, repeated and close by."""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from stages.asset.maps import Maps
+from stages.core.color import srgb_encode
+from stages.core.frames import look_at
+from stages.core.parallel import in_parallel
+from stages.core.shading import Material, shade
+from stages.core.tangents import mikktspace
+from stages.light.gbuffer import trace_view
+from stages.light.lights import BUILTIN
+from stages.light.normal_maps import NormalMap, NormalMaps
+from stages.light.scene import Scene
+from stages.light.transport import Quality, cached_light_set, light_transport
+
+LIGHTS = ("studio", "clear_sky", "interior")
+FOV_Y = np.radians(26.0)
+EXPOSURE = 1.15
+"""Radiance in the picture of a white diffuse plate, on average."""
+
+BACKDROP = 0.11
+RAYS = Quality(lobe=32, light=16, extra=False)
+SEGMENTS = 96
+AROUND = 2
+"""How often the tile goes around the sphere."""
+
+
+class Thing(NamedTuple):
+    """A mesh with UVs: positions, normals (T, 3, 3), uv (T, 3, 2) v up, camera (4, 4)."""
+
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    uv: NDArray[np.float32]
+    c2w: NDArray[np.float64]
+
+
+def preview(maps: Maps, size: int) -> NDArray[np.float32]:
+    """Encoded sRGB, (3 size, 3 size, 3). Args: maps: of a tile. size: pixels along each edge of a picture."""
+    small = [shrunk(a, max(size, 256)) for a in (maps.material, _normals(maps))]
+    lights = [BUILTIN[name]() for name in LIGHTS]
+    cached_light_set(tuple(lights))  # once, not in every thread
+    rows = in_parallel(lambda thing: _pictures(thing, lights, *small, size), (sphere(), plate()))
+    albedo = srgb_encode(shrunk(maps.albedo, size))
+    half = albedo[::2, ::2] if size % 2 == 0 else albedo
+    repeated = np.tile(srgb_encode(shrunk(maps.albedo, len(half))), (2, 2, 1))[:size, :size]
+    close = srgb_encode(maps.albedo[:size, :size]) if len(maps.albedo) >= size else albedo
+    rough = np.repeat(shrunk(maps.material[..., 3:4], size), 3, 2)
+    last = [repeated, close, rough]
+    return np.concatenate([*(np.concatenate(row, 1) for row in rows), np.concatenate(last, 1)], 0).astype(np.float32)
+
+
+def _normals(maps: Maps) -> NDArray[np.float32]:
+    return maps.normal if maps.normal is not None else np.broadcast_to(np.float32([0, 0, 1]), maps.albedo.shape)
+
+
+def shrunk(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """A square map (H, H, C) averaged over whole blocks, to `size` texels along its edge or somewhat more; then cut to it."""
+    step = max(1, len(values) // size)
+    count = len(values) // step
+    blocks = values[: count * step, : count * step].reshape(count, step, count, step, -1).mean((1, 3))
+    if count == size:
+        return blocks
+    nearest = (np.arange(size) * count) // size
+    return blocks[nearest][:, nearest]
+
+
+def _pictures(thing: Thing, lights: list, material: NDArray, normal: NDArray, size: int) -> list[NDArray[np.float32]]:
+    """The thing under each light, encoded, (size, size, 3) each; two samples along each edge of a pixel."""
+    fine = 2 * size
+    vertices, triangles = thing.positions.reshape(-1, 3), np.arange(3 * len(thing.positions), dtype=np.int32).reshape(-1, 3)
+    down = thing.uv * (1, -1) + (0, 1)
+    tangents = mikktspace(thing.positions, thing.normals, thing.uv)
+    bumps = NormalMaps([NormalMap(np.ascontiguousarray(normal))], np.zeros(len(triangles), np.int32), down, tangents)
+    scene = Scene(vertices, triangles, thing.normals, bumps)
+    hits = trace_view(scene, thing.c2w, float(FOV_Y), fine, fine)
+    uv = np.einsum("pk,pkd->pd", hits.barycentric, down[hits.triangle])
+    values = torch.from_numpy(NormalMapLike(material).at(uv))
+    pictures = []
+    for transport in light_transport(scene, hits, lights, RAYS, seed=0):
+        white = float(transport.E.mean())
+        color = np.full((fine, fine, 3), BACKDROP, np.float32)
+        color[hits.mask] = (EXPOSURE / max(white, 1e-9) * 0.6) * shade(transport, Material.of(values)).numpy()
+        pictures.append(srgb_encode(color.reshape(size, 2, size, 2, 3).mean((1, 3))))
+    return pictures
+
+
+class NormalMapLike(NamedTuple):
+    """Any tile, looked up bilinearly where it repeats."""
+
+    values: NDArray[np.float32]
+
+    def at(self, uv: NDArray) -> NDArray[np.float32]:
+        """(K, C) at uv (K, 2), v down."""
+        height, width, _ = self.values.shape
+        x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+        column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+        fx, fy = (x - column)[:, None], (y - row)[:, None]
+        left, right, top, bottom = column % width, (column + 1) % width, row % height, (row + 1) % height
+        upper = self.values[top, left] * (1 - fx) + self.values[top, right] * fx
+        lower = self.values[bottom, left] * (1 - fx) + self.values[bottom, right] * fx
+        return (upper * (1 - fy) + lower * fy).astype(np.float32)
+
+
+def sphere() -> Thing:
+    """A sphere of diameter 1, around which the tile goes `AROUND` times."""
+    theta, phi = np.linspace(0.02, np.pi - 0.02, SEGMENTS + 1), np.linspace(0, 2 * np.pi, 2 * SEGMENTS + 1)
+    t, p = np.meshgrid(theta, phi, indexing="ij")
+    n = np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)], -1)
+    uv = np.stack([AROUND * p / (2 * np.pi), AROUND / 2 * (1 - t / np.pi)], -1)
+    return Thing(*_grid(n / 2, n, uv), _camera((-2.4, -0.35, 0.75)))
+
+
+def plate() -> Thing:
+    """A square of edge 1 that leans back, so that light rakes over it."""
+    a, b = np.meshgrid(np.linspace(-0.5, 0.5, 9), np.linspace(-0.5, 0.5, 9), indexing="ij")
+    c, s = np.cos(0.9), np.sin(0.9)
+    p = np.stack([s * b, -a, c * b], -1)
+    n = np.broadcast_to(np.array([-c, 0.0, s]), p.shape)
+    return Thing(*_grid(p, n, np.stack([a + 0.5, b + 0.5], -1)), _camera((-2.1, 0.25, 1.35)))
+
+
+def _camera(eye: tuple[float, float, float]) -> NDArray[np.float64]:
+    return look_at(np.array(eye), np.zeros(3), np.array([0.0, 0.0, 1.0]))
+
+
+def _grid(p: NDArray, n: NDArray, uv: NDArray) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
+    """Triangle corners (T, 3, …) of a grid of points, wound so that they face along n."""
+
+    def corners(values: NDArray) -> NDArray[np.float32]:
+        a, b, c, d = values[:-1, :-1], values[1:, :-1], values[1:, 1:], values[:-1, 1:]
+        both = np.stack([np.stack([a, b, c], 2), np.stack([a, c, d], 2)], 2)
+        return both.reshape(-1, 3, values.shape[-1]).astype(np.float32)
+
+    positions, normals, coordinates = corners(p), corners(n), corners(uv)
+    facing = np.cross(positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0])
+    if (facing * normals[:, 0]).sum() < 0:
+        positions, normals, coordinates = (v[:, ::-1].copy() for v in (positions, normals, coordinates))
+    return positions, normals, coordinates

@@ -1,0 +1,100 @@
+"""The swatch stage: a prompt in, a folder with the tiling maps of its material and a preview out. No mesh is needed."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.asset.maps import Maps
+from stages.asset.textures import to_8bit, write_textures
+from stages.core.artifact import Provenance, Schema, peek, plain_options, read_manifest, run_log, write_manifest
+from stages.core.images import write_png
+from stages.core.parallel import cores
+from stages.core.progress import Progress, silent
+from stages.material.directions import WHOLE
+from stages.material.masks import settled
+from stages.material.recipe import Recipe
+from stages.material.surface import Surface
+from stages.material.swatch import swatch
+from stages.prior.model import load_prior
+from stages.prior.prompt import explained, read_prompt
+from stages.swatch.options import SwatchOptions
+from stages.swatch.render import preview
+
+SWATCH = Schema("dreammat.swatch", 1, manifest="swatch.json")
+"""A folder: albedo, roughness, metallic, normal, height as .exr and .png, orm.png; preview.png; swatch.json."""
+
+SETTLED_AT = 128
+"""Points along an edge of the square on which masks are settled."""
+
+
+@dataclass(frozen=True)
+class SwatchResult:
+    """What was made. up_to_date: nothing had to be done. report: `extra` of swatch.json."""
+
+    folder: Path
+    up_to_date: bool
+    files: list[str]
+    report: dict[str, Any]
+
+
+def make_swatch(out: Path, options: SwatchOptions, force: bool = False, progress: Progress = silent) -> SwatchResult:
+    """Write the maps of a prompt's material. Raises: InputError, ArtifactError, OutputError."""
+    prior = load_prior()
+    wanted = Provenance(plain_options(options), options.seed, {"prior": prior.identity["weights"]})
+    known = peek(out, SWATCH)
+    if known and known.same_request(wanted) and not force:
+        return SwatchResult(out, True, sorted(read_manifest(out, SWATCH)[1]), known.extra)
+    with run_log(out) as measured:
+        recipe = flat(read_prompt(options.prompt, prior, options.seed, options.metres))
+        progress("maps", 0, 1)
+        maps = tile(recipe, options.size)
+        progress("files", 0, 1)
+        out.mkdir(parents=True, exist_ok=True)
+        files = [*write_textures(out, maps, grey=True), "height.png", "preview.png"]
+        write_png(out / "height.png", height_8bit(maps))
+        progress("preview", 0, 1)
+        write_png(out / "preview.png", preview(maps, options.preview_size))
+        progress("preview", 1, 1)
+        rows = [dict(zip(("what", "where", "look", "color", "roughness", "metal"), row, strict=True)) for row in explained(recipe)]
+        report = {"prompt": options.prompt, "understood": rows, "metres": recipe.base.metres, "recipe": recipe.to_json()}
+        write_manifest(out, SWATCH, Provenance(wanted.options, wanted.seed, wanted.inputs, report), files)
+        measured["texture_size"] = options.size
+    return SwatchResult(out, False, sorted(files), report)
+
+
+def flat(recipe: Recipe) -> Recipe:
+    """A recipe settled on a flat, open square, all of it as large as its base."""
+    across = (np.arange(SETTLED_AT, dtype=np.float32) + np.float32(0.5)) / SETTLED_AT
+    u, v = (a.ravel() for a in np.meshgrid(across, across))
+    up = np.broadcast_to(np.array([0, 0, 1], np.float32), (len(u), 3))
+    surface = Surface.bare(np.stack([u, v, np.zeros_like(u)], 1), up, 1 / SETTLED_AT)
+    layers = tuple(replace(layer, coat=replace(layer.coat, metres=recipe.base.metres)) for layer in recipe.layers)
+    return settled(replace(recipe, layers=layers), surface, WHOLE)
+
+
+def tile(recipe: Recipe, size: int) -> Maps:
+    """The maps of a settled recipe, tiling; height in edges of the square."""
+    made = swatch(recipe, size, cores())
+    material = np.concatenate([made.albedo, made.roughness[..., None], made.metallic[..., None]], 2)
+    return Maps(material, made.height, tile_normals(made.height))
+
+
+def tile_normals(height: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Tangent-space normals of a tile's height, +Y up. Args: (H, H) edges of the tile. Returns: (H, H, 3) unit."""
+    size = np.float32(len(height))
+    right = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * (size / 2)
+    up = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) * (size / 2)
+    normal = np.stack([-right, -up, np.ones_like(height)], -1)
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def height_8bit(maps: Maps) -> NDArray[np.uint8]:
+    """The height from its lowest to its highest point, (H, W) bytes; height.exr has it to scale."""
+    assert maps.height is not None
+    low, high = float(maps.height.min()), float(maps.height.max())
+    return to_8bit((maps.height - low) / max(high - low, 1e-12))
+
+
