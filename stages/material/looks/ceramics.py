@@ -208,10 +208,10 @@ def graniteware(at: Place) -> Look:
 
 
 LOOKS = {
-    "porcelain": porcelain, "glazed_ceramic": glazed_ceramic, "celadon": celadon, "tenmoku": tenmoku,
+    "porcelain": porcelain, "glazed ceramic": glazed_ceramic, "celadon": celadon, "tenmoku": tenmoku,
     "stoneware": stoneware, "raku": raku, "terracotta": terracotta, "enamel": enamel, "graniteware": graniteware,
 }  # fmt: skip
 METRES = {
-    "porcelain": 0.2, "glazed_ceramic": 0.2, "celadon": 0.15, "tenmoku": 0.15, "stoneware": 0.15, "raku": 0.2,
+    "porcelain": 0.2, "glazed ceramic": 0.2, "celadon": 0.15, "tenmoku": 0.15, "stoneware": 0.15, "raku": 0.2,
     "terracotta": 0.25, "enamel": 0.3, "graniteware": 0.2,
 }  # fmt: skip

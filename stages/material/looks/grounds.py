@@ -351,10 +351,10 @@ def salt(at: Place) -> Look:
 
 
 LOOKS = {
-    "sand": sand, "fine_sand": fine_sand, "soil": soil, "cracked_mud": cracked_mud, "grass": grass, "moss": moss,
+    "sand": sand, "fine sand": fine_sand, "soil": soil, "cracked mud": cracked_mud, "grass": grass, "moss": moss,
     "leaves": leaves, "snow": snow, "ice": ice, "ash": ash, "charcoal": charcoal, "coal": coal, "salt": salt,
 }  # fmt: skip
 METRES = {
-    "sand": 1.2, "fine_sand": 0.15, "soil": 0.4, "cracked_mud": 0.8, "grass": 0.5, "moss": 0.25, "leaves": 0.4,
+    "sand": 1.2, "fine sand": 0.15, "soil": 0.4, "cracked mud": 0.8, "grass": 0.5, "moss": 0.25, "leaves": 0.4,
     "snow": 0.8, "ice": 0.8, "ash": 0.25, "charcoal": 0.2, "coal": 0.3, "salt": 0.06,
 }  # fmt: skip

@@ -383,13 +383,13 @@ def shingles(at: Place) -> Look:
 
 
 LOOKS = {
-    "brick": brick, "old_brick": old_brick, "yellow_brick": yellow_brick, "concrete_block": concrete_block,
-    "ashlar": ashlar, "setts": setts, "paving": paving, "ceramic_tiles": ceramic_tiles, "metro_tiles": metro_tiles,
-    "pool_mosaic": pool_mosaic, "mosaic": mosaic, "terracotta_tiles": terracotta_tiles, "roof_tiles": roof_tiles,
+    "brick": brick, "old brick": old_brick, "yellow brick": yellow_brick, "concrete block": concrete_block,
+    "ashlar": ashlar, "setts": setts, "paving": paving, "ceramic tiles": ceramic_tiles, "metro tiles": metro_tiles,
+    "pool mosaic": pool_mosaic, "mosaic": mosaic, "terracotta tiles": terracotta_tiles, "roof tiles": roof_tiles,
     "shingles": shingles,
 }  # fmt: skip
 METRES = {
-    "brick": 1.8, "old_brick": 1.8, "yellow_brick": 1.8, "concrete_block": 1.6, "ashlar": 2.2, "setts": 1.2,
-    "paving": 2.4, "ceramic_tiles": 0.9, "metro_tiles": 0.8, "pool_mosaic": 0.3, "mosaic": 0.4, "terracotta_tiles": 1.0,
-    "roof_tiles": 1.68, "shingles": 1.5,
+    "brick": 1.8, "old brick": 1.8, "yellow brick": 1.8, "concrete block": 1.6, "ashlar": 2.2, "setts": 1.2,
+    "paving": 2.4, "ceramic tiles": 0.9, "metro tiles": 0.8, "pool mosaic": 0.3, "mosaic": 0.4, "terracotta tiles": 1.0,
+    "roof tiles": 1.68, "shingles": 1.5,
 }  # fmt: skip

@@ -463,15 +463,15 @@ def lava(at: Place) -> Look:
 
 
 LOOKS = {
-    "granite": granite, "pink_granite": pink_granite, "black_granite": black_granite, "marble": marble,
-    "black_marble": black_marble, "green_marble": green_marble, "sandstone": sandstone, "limestone": limestone,
+    "granite": granite, "pink granite": pink_granite, "black granite": black_granite, "marble": marble,
+    "black marble": black_marble, "green marble": green_marble, "sandstone": sandstone, "limestone": limestone,
     "slate": slate, "travertine": travertine, "basalt": basalt, "terrazzo": terrazzo, "onyx": onyx, "rock": rock,
-    "rock_wall": rock_wall, "cobblestone": cobblestone, "pebbles": pebble_bed, "gravel": gravel, "jade": jade,
+    "rock wall": rock_wall, "cobblestone": cobblestone, "pebbles": pebble_bed, "gravel": gravel, "jade": jade,
     "malachite": malachite, "lapis": lapis, "lava": lava,
 }  # fmt: skip
 METRES = {
-    "granite": 0.25, "pink_granite": 0.3, "black_granite": 0.2, "marble": 1.2, "black_marble": 1.2, "green_marble": 1.0,
+    "granite": 0.25, "pink granite": 0.3, "black granite": 0.2, "marble": 1.2, "black marble": 1.2, "green marble": 1.0,
     "sandstone": 0.8, "limestone": 0.4, "slate": 0.6, "travertine": 0.5, "basalt": 0.25, "terrazzo": 0.3, "onyx": 0.6,
-    "rock": 1.2, "rock_wall": 1.8, "cobblestone": 1.0, "pebbles": 0.4, "gravel": 0.25, "jade": 0.2, "malachite": 0.2,
+    "rock": 1.2, "rock wall": 1.8, "cobblestone": 1.0, "pebbles": 0.4, "gravel": 0.25, "jade": 0.2, "malachite": 0.2,
     "lapis": 0.15, "lava": 1.5,
 }  # fmt: skip

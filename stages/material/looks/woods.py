@@ -77,5 +77,5 @@ def oak_boards(at: Place) -> Look:
     return boards(at, TIMBERS["oak"])
 
 
-LOOKS = {"oak": oak, "walnut": walnut, "oak_boards": oak_boards}
-METRES = {"oak": 0.6, "walnut": 0.5, "oak_boards": 0.96}
+LOOKS = {"oak": oak, "walnut": walnut, "oak boards": oak_boards}
+METRES = {"oak": 0.6, "walnut": 0.5, "oak boards": 0.96}
