@@ -109,3 +109,16 @@ def transfer(prep: Path, material: Path, asset: Path, common: Common, reference:
 
     found = dataclasses.asdict(report_transfer(prep, material, asset, reference))
     show(common, found, [f"{name.replace('_', ' '):18} {value:.4g}" for name, value in found.items()])
+
+
+@command.command()
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write sheets and CSV.")
+@click.option("--references", type=INPUT, metavar="FOLDER", help="Real sets, NAME_01/basecolor.png each, to measure beside.")
+@common_options
+def materials(output: Path, references: Path | None, common: Common) -> None:
+    """Every substance as a swatch: contact sheets, and its contrast scale by scale."""
+    from stages.report.materials import report_materials, summary
+
+    with reporter(common) as progress:
+        rows = report_materials(output, references, progress)
+    show(common, {"rows": [{"name": row.name, "slope": row.contrast.slope, "own": row.own} for row in rows]}, summary(rows))
