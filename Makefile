@@ -25,7 +25,7 @@ BAKE_OPTIONS       ?=
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup demo test lint asset batch bench clean
+.PHONY: help setup demo test hostile lint asset batch bench clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -97,6 +97,9 @@ batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: mak
 
 test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
+
+hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through prep within their time (half an hour)
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.prep.hostile
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.prep.source import Source
+from stages.prep.source import Source, rows_of
 from stages.prep.topology import components, edges
 
 _UNIT = (0.9, 1.1)  # lengths that pass for a unit normal
@@ -62,13 +62,13 @@ def authored(source: Source, loops: NDArray, to_world: NDArray) -> NDArray[np.fl
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.linalg.norm(raw, axis=-1)
         usable = (rows >= 0) & (length > _UNIT[0]) & (length < _UNIT[1])
-    part = source.loop_part()[loops[:, 0]]
-    for index, entry in enumerate(source.parts):
-        mine = usable & (part == index)[:, None]
-        linear = to_world[:3, :3] @ np.reshape(entry.transform, (4, 4))[:3, :3]
-        if mine.any() and np.linalg.det(linear) != 0:
-            turned = raw[mine] @ np.linalg.inv(linear)  # rows times the inverse: the inverse transpose of columns
-            result[mine] = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+    face_part = source.loop_part()[loops[:, 0]]
+    for part, faces in zip(source.parts, rows_of(face_part, len(source.parts)), strict=True):
+        linear = to_world[:3, :3] @ np.reshape(part.transform, (4, 4))[:3, :3]
+        if np.linalg.det(linear) != 0:
+            # rows times the inverse: the inverse transpose of columns
+            turned = np.where(usable[faces, :, None], raw[faces], np.nan) @ np.linalg.inv(linear)
+            result[faces] = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
     return result
 
 

@@ -68,7 +68,8 @@ def repair(source: Source, up: str, weld_tolerance: float, path: Path) -> Workin
 
 def _as_seen(loops: NDArray, source: Source) -> NDArray:
     """Loops with triangles of mirroring nodes turned round (glTF 2.0, section 3.7.4)."""
-    mirrored = np.array([np.linalg.det(np.reshape(part.transform, (4, 4))[:3, :3]) < 0 for part in source.parts])
+    transforms = np.reshape([part.transform for part in source.parts], (-1, 4, 4))
+    mirrored = np.linalg.slogdet(transforms[:, :3, :3])[0] < 0
     flip = mirrored[source.loop_part()[loops[:, 0]]]
     return np.where(flip[:, None], loops[:, [0, 2, 1]], loops)
 

@@ -5,6 +5,7 @@ they cannot take literally.
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -55,9 +56,8 @@ class Source:
         placed = self.vertices.copy()
         part_of_vertex = np.full(len(placed), -1)
         part_of_vertex[self.loop_vertex] = self.loop_part()
-        for index, part in enumerate(self.parts):
+        for part, mine in zip(self.parts, rows_of(part_of_vertex, len(self.parts)), strict=True):
             if part.transform != IDENTITY:
-                mine = part_of_vertex == index
                 with np.errstate(invalid="ignore", over="ignore"):
                     placed[mine] = transform_points(np.reshape(part.transform, (4, 4)), placed[mine])
         return placed
@@ -65,6 +65,13 @@ class Source:
     def loop_part(self) -> NDArray[np.int32]:
         """(L,) the part of each loop."""
         return np.repeat(self.face_part, np.diff(self.loop_start))
+
+
+def rows_of(labels: NDArray, count: int) -> list[NDArray[np.int64]]:
+    """The rows of `labels` that are 0, those that are 1, … count - 1."""
+    order = np.argsort(labels, kind="stable")
+    bounds = np.searchsorted(labels[order], np.arange(count + 1))
+    return [order[start:stop] for start, stop in pairwise(bounds)]
 
 
 def polygons(lengths: NDArray, vertices: int, loop_vertex: NDArray, path: Path) -> tuple[NDArray, NDArray]:
