@@ -4,7 +4,7 @@ A *loop* is one corner of one face, in the order of the file. Readers repair not
 they cannot take literally.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -35,7 +35,8 @@ class Source:
     loop_start: (P + 1,) int32; face p has loops loop_start[p] .. loop_start[p + 1] - 1.
     loop_vertex, loop_uv, loop_normal: (L,) int32 rows of the above; -1 where a loop has no UV or normal.
     face_part: (P,) int32 rows of parts. v_down: whether v = 0 is the top of the image.
-    skipped: what the file holds besides triangles and polygons, with its count.
+    skipped: what the file holds besides triangles and polygons, with its count. applied: what made these vertices out of
+    the file's (skins, morph targets, instances). more_uv: further UV sets, uv and loop_uv of each.
     """
 
     format: str
@@ -50,6 +51,12 @@ class Source:
     parts: list[Part]
     v_down: bool = False
     skipped: dict[str, int] = field(default_factory=dict)
+    applied: dict[str, int] = field(default_factory=dict)
+    more_uv: list[tuple[NDArray[np.float64], NDArray[np.int32]]] = field(default_factory=list)
+
+    def by_uv_set(self) -> list["Source"]:
+        """This source, and itself with each further UV set in the first one's place."""
+        return [self, *(replace(self, uv=uv, loop_uv=loop_uv) for uv, loop_uv in self.more_uv)]
 
     def placed_vertices(self) -> NDArray[np.float64]:
         """(SV, 3) vertices with node transforms applied; an unreferenced vertex stays as it is."""
@@ -86,6 +93,8 @@ def polygons(lengths: NDArray, vertices: int, loop_vertex: NDArray, path: Path) 
             f"{path}: {vertices} vertices and {len(lengths)} faces, expected a surface; export the mesh again"
         )
     check_range(loop_vertex, vertices, "vertex", path)
+    if len(loop_vertex) >= 2**31:
+        raise InputError(f"{path}: {len(loop_vertex)} corners, expected fewer than 2147483648; split the mesh")
     start = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
     return start, np.asarray(loop_vertex).astype(np.int32)
 

@@ -12,11 +12,12 @@ from stages.core.artifact import Provenance, peek, plain_options, run_log, save_
 from stages.core.errors import InputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
+from stages.prep.gltf_file import companions
 from stages.prep.measure import topology
 from stages.prep.normals import authored, face_normals, shading_normals
 from stages.prep.options import PrepOptions
 from stages.prep.orient import outward
-from stages.prep.read_gltf import companions, read_gltf
+from stages.prep.read_gltf import read_gltf
 from stages.prep.read_obj import read_obj
 from stages.prep.read_off import read_off
 from stages.prep.read_ply import read_ply
@@ -56,11 +57,12 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
         working = repair(source, options.up, options.weld_tolerance, mesh)
         normals, findings = oriented(source, working, options.crease_angle)
         progress("unwrap", 2, 4)
-        loop_uv, kept, layout = _texture(source, working, options, mesh)
+        source, layout = _with_bakeable_uv(source, working, options, mesh)
+        loop_uv, kept, way = _texture(source, working, options, layout["unusable_uv"])
         uv = loop_uv[working.loops]
         chart = uv_charts(working.triangles, uv)
         measured = topology(working.vertices, working.triangles)
-        findings = _findings(source, working, findings, layout) | measured | {
+        findings = _findings(source, working, findings, layout | way) | measured | {
             "charts": int(chart.max()) + 1,
             "texel_density": _texel_density(working, uv, options.texture_size),
         }
@@ -109,17 +111,32 @@ def oriented(source: Source, working: Working, crease_angle: float) -> tuple[NDA
     }
 
 
-def _texture(
+def _with_bakeable_uv(
     source: Source, working: Working, options: PrepOptions, path: Path
+) -> tuple[Source, dict[str, Any]]:
+    """The source with the first of its UV sets that can be baked, and which; or as it is, and what is wrong with it.
+
+    Raises: InputError where a set must be kept and none can be.
+    """
+    if options.uv == "new":
+        return source, {"unusable_uv": "new ones asked for", "uv_set": None}
+    _, area = face_normals(working.vertices, working.triangles)
+    problems = []
+    for number, candidate in enumerate(source.by_uv_set()):
+        problems.append(unusable(loop_uvs(candidate)[working.loops], area))
+        if problems[-1] is None:
+            return candidate, {"unusable_uv": None, "uv_set": number}
+    if options.uv == "keep":
+        raise InputError(f"{path}: its UVs cannot be kept: {problems[0]}; mend them or let new ones be made")
+    return source, {"unusable_uv": problems[0], "uv_set": None}
+
+
+def _texture(
+    source: Source, working: Working, options: PrepOptions, problem: str | None
 ) -> tuple[NDArray[np.float32], bool, dict[str, Any]]:
     """UVs of all source loops (L, 2), whether they are the source's, and how they came about."""
-    own = loop_uvs(source)
-    _, area = face_normals(working.vertices, working.triangles)
-    problem = "new ones asked for" if options.uv == "new" else unusable(own[working.loops], area)
     if problem is None:
-        return _everywhere(own, working), True, {"unusable_uv": None, "unwrap": "kept", "gutter": None}
-    if options.uv == "keep":
-        raise InputError(f"{path}: its UVs cannot be kept: {problem}; mend them or let new ones be made")
+        return _everywhere(loop_uvs(source), working), True, {"unwrap": "kept", "gutter": None}
     polygon = np.searchsorted(source.loop_start, working.loops[:, 0], "right") - 1
     seconds = options.unwrap_seconds if len(polygon) <= options.unwrap_triangles else 0.0
     layout = unwrap(
@@ -127,8 +144,7 @@ def _texture(
     )  # fmt: skip
     made = np.full((len(source.loop_vertex), 2), np.nan, np.float32)
     made[working.loops] = layout.uv
-    how = {"unusable_uv": problem, "unwrap": layout.method, "gutter": layout.packing.gutter}
-    return _everywhere(made, working), False, how
+    return _everywhere(made, working), False, {"unwrap": layout.method, "gutter": layout.packing.gutter}
 
 
 def _everywhere(uv: NDArray, working: Working) -> NDArray[np.float32]:
@@ -156,6 +172,7 @@ def _findings(source: Source, working: Working, more: dict[str, Any], layout: di
         **more,
         **layout,
         "skipped": source.skipped,
+        "applied": source.applied,
     }
 
 
