@@ -53,7 +53,7 @@ $(VALIDATOR): | $(VENV)/.ready
 # NAME/mesh.* and NAME/prompt.txt -> prep.npz -> conditions/ -> material.npz -> asset/
 # `prep` always runs: it hashes the mesh, and leaves prep.npz untouched when that is up to date.
 
-MESHES = obj glb gltf ply stl off
+MESHES = obj glb gltf fbx usdz usdc usda usd ply stl off
 
 %/prep.npz: FORCE | $(VENV)/.ready
 	@mesh=$$(cat '$*/mesh.path' 2>/dev/null || ls $(foreach type,$(MESHES),'$*'/*.$(type)) 2>/dev/null | head -n 1); \

@@ -17,11 +17,13 @@ from stages.prep.measure import topology
 from stages.prep.normals import authored, face_normals, shading_normals
 from stages.prep.options import PrepOptions
 from stages.prep.orient import outward
+from stages.prep.read_fbx import read_fbx
 from stages.prep.read_gltf import read_gltf
 from stages.prep.read_obj import read_obj
 from stages.prep.read_off import read_off
 from stages.prep.read_ply import read_ply
 from stages.prep.read_stl import read_stl
+from stages.prep.read_usd import layers, read_usd
 from stages.prep.repair import Working, repair
 from stages.prep.source import Source
 from stages.prep.topology import components, edges
@@ -30,6 +32,12 @@ from stages.prep.uv import loop_uvs, signed_area, unusable, uv_charts
 
 READERS: dict[str, Callable[[Path], Source]] = {
     ".obj": read_obj, ".ply": read_ply, ".stl": read_stl, ".off": read_off, ".glb": read_gltf, ".gltf": read_gltf,
+    ".fbx": read_fbx, ".usd": read_usd, ".usda": read_usd, ".usdc": read_usd, ".usdz": read_usd,
+}  # fmt: skip
+
+# files that a mesh is spread over
+BESIDE: dict[str, Callable[[Path], dict[str, Path]]] = {
+    ".gltf": companions, ".usd": layers, ".usda": layers, ".usdc": layers,
 }  # fmt: skip
 
 
@@ -90,8 +98,8 @@ def _inputs(mesh: Path) -> dict[str, str]:
     inputs = {"mesh": sha256_file(mesh)}
     if mesh.stat().st_size == 0:
         raise InputError(f"{mesh}: is empty; export the mesh again")
-    if suffix == ".gltf":
-        inputs |= {f"mesh:{uri}": sha256_file(path) for uri, path in companions(mesh).items()}
+    if suffix in BESIDE:
+        inputs |= {f"mesh:{name}": sha256_file(path) for name, path in BESIDE[suffix](mesh).items()}
     return inputs
 
 
