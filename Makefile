@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV   ?= .venv
 RUN    := $(VENV)/bin
 DREAMMAT := $(RUN)/dreammat
+INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 VALIDATOR := $(VENV)/.validator
 DIFFUSION := $(VENV)/.diffusion
 MITSUBA := $(VENV)/.mitsuba
@@ -25,22 +26,28 @@ BAKE_OPTIONS       ?=
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup demo test hostile lint asset batch bench clean
+.PHONY: help setup demo test campaign hostile lint asset batch bench clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(VENV)/.ready  ## make the virtual environment and install everything into it
 
-$(VENV)/.ready: pyproject.toml
+$(VENV)/.ready: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "dreammat needs Python 3.10 or newer")'
 	$(PYTHON) -m venv $(VENV)
-	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,report]'
+	$(INSTALL) --editable '.[dev,report]'
+	@echo "compiling kernels once, for all runs to come"
+	@tiny=$$(mktemp -d) && $(RUN)/python examples/urn.py $$tiny/urn.obj && \
+	$(DREAMMAT) prep $$tiny/urn.obj -o $$tiny/prep.npz -q && \
+	$(DREAMMAT) conditions $$tiny/prep.npz -o $$tiny/conditions --views 1 --size 64 -q && \
+	$(DREAMMAT) distill $$tiny/conditions --prompt copper --steps 1 -o $$tiny/material.npz -q && \
+	$(DREAMMAT) bake $$tiny/prep.npz $$tiny/material.npz -o $$tiny/asset --size 512 -q && rm -r $$tiny
 	@touch $@
 
 # the packages of --guidance sd, which its tests run on a tiny model
-$(DIFFUSION): pyproject.toml | $(VENV)/.ready
-	$(RUN)/python -m pip install --quiet --disable-pip-version-check --editable '.[sd]'
+$(DIFFUSION): pyproject.toml constraints.txt | $(VENV)/.ready
+	$(INSTALL) --editable '.[sd]'
 	@touch $@
 
 # the Khronos glTF validator, where npm can get it; its test says so and skips otherwise
@@ -97,6 +104,9 @@ batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: mak
 
 test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
+
+campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.campaign --reads 1000 --damages 100 --kills 100
 
 hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through prep within their time (half an hour)
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.prep.hostile

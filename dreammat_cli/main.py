@@ -61,6 +61,7 @@ def cli() -> None:
 def main() -> None:
     """Entry point: errors become one line and an exit code; SIGTERM ends like Ctrl-C, in a state that resumes."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # threads of torch that wait leave their core to others
     try:
         cli(standalone_mode=False)
     except DreammatError as error:

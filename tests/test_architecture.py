@@ -10,14 +10,15 @@ ROOT = Path(__file__).resolve().parent.parent
 ALLOWED = {
     "core": set(),
     "light": {"core"},
+    "asset": {"core", "light"},
     "prior": {"core"},
     "sd": {"core"},
     "prep": {"core", "light", "prior"},
-    "conditions": {"core", "light", "prior"},
+    "conditions": {"core", "light", "prior", "asset"},
     "distill": {"core", "light", "prior", "sd"},
-    "bake": {"core", "light", "prior"},
-    "train": {"core", "light", "prior", "sd", "prep", "conditions", "distill", "bake"},
-    "report": {"core", "light", "prior", "sd", "prep", "conditions", "distill", "bake", "train"},
+    "bake": {"core", "light", "prior", "asset"},
+    "train": {"core", "light", "prior", "sd", "asset", "prep", "conditions", "distill", "bake"},
+    "report": {"core", "light", "prior", "sd", "prep", "conditions", "distill", "bake", "train", "asset"},
 }
 
 SOURCES = sorted(path for package in ("stages", "dreammat_cli") for path in (ROOT / package).rglob("*.py"))

@@ -1,50 +1,18 @@
 """All four stages through the command line: killed at random moments and run again, they end in the same output."""
 
-import hashlib
 import random
+import resource
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-CLOCKED = (".run.json", "run.json", ".curve.csv")
-"""Names whose content tells how long something took."""
-
-
-def cube_sphere(path: Path, count: int = 6) -> None:
-    """A rounded box of quads, as an OBJ without UVs."""
-    t = np.linspace(-1, 1, count + 1)
-    lines, faces, base = [], [], 1
-    for axis in range(3):
-        for side in (-1.0, 1.0):
-            u, v = np.meshgrid(t, t, indexing="ij")
-            points = np.stack(np.broadcast_arrays(u, v, side), -1).reshape(-1, 3)
-            points = np.roll(points, axis, 1)
-            points = points * (0.5 + 0.5 / np.linalg.norm(points, axis=1, keepdims=True))
-            lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
-            for i in range(count):
-                for j in range(count):
-                    square = ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))
-                    corners = [base + a * (count + 1) + b for a, b in square]
-                    faces.append("f " + " ".join(map(str, corners if side > 0 else corners[::-1])))
-            base += (count + 1) ** 2
-    path.write_text("\n".join(lines + faces) + "\n")
-
-
-def stages(folder: Path) -> dict[str, list[str]]:
-    """The command of each stage, at a small setting, all paths within a folder."""
-    prep, conditions, material = folder / "prep.npz", folder / "conditions", folder / "material.npz"
-    few = ["--views", "5", "--size", "48", "--env", "overcast", "--env", "studio", "--quality", "draft"]
-    return {
-        "prep": ["prep", str(folder / "mesh.obj"), "-o", str(prep), "--texture-size", "512", "--padding", "4"],
-        "conditions": ["conditions", str(prep), "-o", str(conditions), *few],
-        "distill": ["distill", str(conditions), "--prompt", "red plastic", "-o", str(material), "--steps", "60"],
-        "bake": ["bake", str(prep), str(material), "-o", str(folder / "asset"), "--size", "512", "--preview-size", "48"],
-    }
+from tests import campaign
+from tests.pipeline import cube_sphere, fingerprint, stages
 
 
 def heed_interrupts() -> None:
@@ -75,11 +43,6 @@ def kill_after(arguments: list[str], seconds: float, how: signal.Signals) -> int
         process.send_signal(how)
         process.communicate(timeout=120)
     return process.returncode
-
-
-def fingerprint(folder: Path) -> dict[str, str]:
-    files = [p for p in sorted(folder.rglob("*")) if p.is_file() and not p.name.endswith(CLOCKED)]
-    return {str(p.relative_to(folder)): hashlib.sha256(p.read_bytes()).hexdigest() for p in files}
 
 
 @pytest.fixture(scope="module")
@@ -132,3 +95,17 @@ def test_an_interrupt_says_how_to_go_on(whole: tuple[Path, dict[str, float]], tm
     _, error = process.communicate(timeout=60)
     assert process.returncode == 130
     assert error.decode().strip() == "error: interrupted; the same command continues where it stopped"
+
+
+def test_damaged_artefacts_are_refused_in_one_line_or_read_alike(
+    whole: tuple[Path, dict[str, float]], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The first part of `make campaign`, which also runs whole stages on damaged artefacts."""
+    reference = tmp_path / "reference"
+    shutil.copytree(whole[0], reference)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    ends, faults = campaign.read_all(reference, 300, seed=1)
+    assert faults == []
+    assert ends["refused"] > 150
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 1 << 20  # KiB
+    assert capfd.readouterr().err == ""

@@ -8,8 +8,8 @@ are fetched once and kept until a point leaves it, and the network runs in the s
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.jit import compiled, in_parallel
 from stages.core.field import HASH_PRIMES, OUTPUTS, MaterialField
+from stages.core.parallel import compiled, in_parallel
 
 BLOCK = 256
 """Points that go through the network at a time."""

@@ -13,10 +13,10 @@ import torch
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
-from stages.bake.jit import in_parallel
 from stages.bake.raster import Surface
 from stages.core.color import srgb_encode
 from stages.core.frames import camera_rays, look_at
+from stages.core.parallel import in_parallel
 from stages.core.progress import Progress
 from stages.core.shading import Material, shade
 from stages.light.environment import Environment

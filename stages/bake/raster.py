@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.jit import compiled, in_parallel
+from stages.core.parallel import compiled, in_parallel
 
 BAND = 64
 """Rows of texels that one task rasterises."""

@@ -1,23 +1,27 @@
 """The bake stage: prep.npz and material.npz in, a folder with textures, models and a preview out."""
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.asset.gltf import Look, write_glb
+from stages.asset.maps import Maps
+from stages.asset.model import source_model
+from stages.asset.passed_on import PassedOn
+from stages.asset.textures import write_textures
+from stages.asset.traced import baked_bumps, traced_scene, world_frames
+from stages.asset.wavefront import write_obj
 from stages.bake.fill import fill_unseen, pad
-from stages.bake.gltf import write_glb
 from stages.bake.options import BakeOptions
 from stages.bake.preview import contact_sheet
 from stages.bake.raster import Layout, Surface, touched_texels
-from stages.bake.source import source_model
+from stages.bake.relief import relief_normals
 from stages.bake.texels import bake_texels
-from stages.bake.textures import write_textures
 from stages.bake.visibility import Views, is_open, patches, seen_points
-from stages.bake.wavefront import write_obj
 from stages.core.artifact import (
     Artifact,
     Provenance,
@@ -25,6 +29,7 @@ from stages.core.artifact import (
     load_npz,
     peek,
     plain_options,
+    read_json,
     read_manifest,
     reason,
     run_log,
@@ -69,7 +74,7 @@ class Subject:
         touched = touched_texels(layout)
         if not (touched.triangle >= 0).any():
             raise ArtifactError(f"{prep}: its UVs cover no texel of {size}; make it again with new UVs")
-        scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        scene = traced_scene(mesh)
         return Subject(mesh, scene, is_open(mesh["triangles"]), layout, touched)
 
     def points(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
@@ -105,6 +110,7 @@ def bake(
         subject = Subject.of(prep, mesh, options.size)
         open_folder(out)
         maps, coverage = bake_maps(subject, made, field, options, progress)
+        maps = with_normals(subject, maps)
         files, notes = write_asset(out, subject, maps, options, progress)
         report = {**describe(mesh, made), **coverage, **notes}
         write_manifest(out, ASSET, Provenance(wanted.options, wanted.seed, inputs, report), files)
@@ -121,13 +127,19 @@ def material_field(path: Path, made: Artifact) -> MaterialField:
 
 
 def open_folder(out: Path) -> None:
-    """Make the folder; where it holds an earlier asset, take that away, its manifest first. Raises: OutputError."""
+    """Make the folder; where it holds an earlier asset, of whatever version, take that away, its manifest first.
+
+    Raises: OutputError, also where a file of another program has the manifest's name.
+    """
+    manifest = out / ASSET.manifest
+    old = read_json(manifest) or {}
+    if manifest.exists() and not (isinstance(old, dict) and old.get("schema") == ASSET.name):
+        raise OutputError(f"{manifest}: not a file of dreammat's; give another folder, or move that file away")
     try:
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()
-        old = read_manifest(out, ASSET)[1] if peek(out, ASSET) else {}
-        (out / ASSET.manifest).unlink(missing_ok=True)
-        for name in old:
+        manifest.unlink(missing_ok=True)
+        for name in old.get("files") or {}:
             (out / Path(name).name).unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{out}: cannot be written: {reason(error)}; give a folder that can") from error
@@ -135,11 +147,11 @@ def open_folder(out: Path) -> None:
 
 def bake_maps(
     subject: Subject, made: Artifact, field: MaterialField, options: BakeOptions, progress: Progress
-) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """Albedo, roughness and metallic of every texel, to the last one.
+) -> tuple[Maps, dict[str, Any]]:
+    """The material of every texel, to the last one.
 
     Returns:
-        (size, size, 5); the shares of texels on charts and, of these, that no view saw.
+        the maps; the shares of texels on charts and, of these, that no view saw.
     """
     on_chart = subject.touched.triangle >= 0
     corners = subject.mesh["vertices"][subject.mesh["triangles"]]
@@ -147,7 +159,20 @@ def bake_maps(
     unseen = mend_unseen(subject, views_of(made), maps, progress)
     progress("padding", 0, 1)
     pad(maps, on_chart)
-    return maps, {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
+    return Maps(maps), {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
+
+
+def with_normals(subject: Subject, maps: Maps) -> Maps:
+    """The maps with the normal map of their height, which lies on the source's own where it has one."""
+    if maps.height is None:
+        return maps
+    mesh, touched = subject.mesh, subject.touched
+    corners, frames = mesh["vertices"][mesh["triangles"]], world_frames(mesh)
+    normals = relief_normals(
+        maps.height, touched, subject.layout, mesh["charts"], (corners, mesh["normals"]), frames, subject.scene.bumps
+    )  # fmt: skip
+    pad(normals, touched.triangle >= 0)
+    return replace(maps, normal=normals)
 
 
 def mend_unseen(subject: Subject, views: Views, maps: NDArray[np.float32], progress: Progress) -> float:
@@ -180,21 +205,35 @@ def views_of(made: Artifact) -> Views:
 
 
 def write_asset(
-    out: Path, subject: Subject, maps: NDArray[np.float32], options: BakeOptions, progress: Progress
+    out: Path, subject: Subject, maps: Maps, options: BakeOptions, progress: Progress
 ) -> tuple[list[str], dict[str, int]]:
     """Write textures, models and preview. Returns: the files' names; what the models could not hold."""
     progress("files", 0, 1)
     mesh, scene = subject.mesh, subject.scene
+    if maps.normal is not None:
+        scene = scene.bumped(baked_bumps(mesh, maps.normal))
     is_obj = mesh.provenance.extra["source_format"] == "obj"
     files = write_textures(out, maps, grey=is_obj)
-    model = source_model(mesh, double_sided=subject.open)
-    write_glb(out / "model.glb", model, {name: (out / f"{name}.png").read_bytes() for name in ("albedo", "orm")})
+    names = {part["material"] for part in mesh.provenance.extra["parts"]}
+    look = look_of(out, maps, PassedOn.of(mesh))
+    normal_mapped = set(look.passed_on.normal_maps()) if maps.normal is None else names
+    model = source_model(mesh, subject.open, normal_mapped)
+    write_glb(out / "model.glb", model, look)
     files.append("model.glb")
     if is_obj:
-        write_obj(out / "model.obj", mesh)
+        write_obj(out / "model.obj", mesh, relief=maps.normal is not None)
         files += ["model.obj", "model.mtl"]
-    write_png(out / "preview.png", contact_sheet(scene, mesh["uv"], maps, options.preview_size, progress))
+    write_png(out / "preview.png", contact_sheet(scene, mesh["uv"], maps.material, options.preview_size, progress))
     return [*files, "preview.png"], model.notes
+
+
+def look_of(folder: Path, maps: Maps, passed_on: PassedOn) -> Look:
+    """What model.glb's materials show: the PNGs in the folder, and what the source brings that they do not replace."""
+    names = ["albedo", "orm"] + ["normal"] * (maps.normal is not None)
+    for made, kind in ((maps.normal, "normalTexture"), (maps.occlusion, "occlusionTexture")):
+        passed_on = passed_on if made is None else passed_on.without(kind)
+    images = {name: (folder / f"{name}.png").read_bytes() for name in names}
+    return Look(images, maps.occlusion is not None, passed_on)
 
 
 def describe(mesh: Artifact, made: Artifact) -> dict[str, Any]:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.bake.evaluate import evaluate
-from stages.bake.jit import compiled, in_parallel
 from stages.bake.raster import Layout, Surface, bands, covered_samples
 from stages.core.field import OUTPUTS, MaterialField
+from stages.core.parallel import compiled, in_parallel
 from stages.core.progress import Progress
 
 TASKS = 8

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.jit import in_parallel
 from stages.bake.raster import Surface
 from stages.core.frames import project
+from stages.core.parallel import in_parallel
 from stages.light.scene import OFFSET, Scene
 
 GRID = 512

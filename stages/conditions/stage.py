@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from stages.asset.traced import traced_scene
 from stages.conditions.cameras import Cameras, place_cameras
 from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
 from stages.conditions.options import ConditionsOptions
@@ -16,6 +17,7 @@ from stages.conditions.predict import choose_quality
 from stages.core.artifact import (
     MANIFEST,
     Provenance,
+    is_readable_exr,
     load_npz,
     peek,
     plain_options,
@@ -88,7 +90,7 @@ def conditions(
         save_cameras(out, cameras, request, options)
         for light in lights:
             save_environment(out / "environments" / f"{light.name}.exr", light)
-        scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+        scene = traced_scene(mesh)
         smooth = scene.shaded_smooth() if options.profile == SD else None
         quality, expected = QUALITY[options.quality], None
         if options.error:
@@ -170,8 +172,8 @@ def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: Cond
 
 
 def view_is_there(out: Path, view: int, names: tuple[str, ...], options: ConditionsOptions) -> bool:
-    """Whether every file of a view has been written; each is renamed into place when whole."""
-    return all((out / name).is_file() for name in view_files(view, names, options))
+    """Whether every file of a view has been written, and none of them damaged since: no manifest tells of it yet."""
+    return all(is_readable_exr(out / name) for name in view_files(view, names, options))
 
 
 def view_files(view: int, names: tuple[str, ...], options: ConditionsOptions) -> list[str]:

@@ -6,8 +6,6 @@ roughness relative to it, so that a white furnace comes out exact between knots 
 """
 
 import functools
-import os
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core.brdf import MIN_ALPHA, alpha_from_roughness, directional_albedo
+from stages.core.parallel import in_parallel
 
 FILE = Path(__file__).with_name("albedo.npy")
 
@@ -67,8 +66,7 @@ def specular_albedo(roughness: Tensor, cosine: Tensor) -> Tensor:
 def make_table(resolution: int = 256) -> NDArray[np.float32]:
     """The table by quadrature, `resolution` points along each side of the sampling square."""
     alphas = [max(alpha_from_roughness(r), MIN_ALPHA) for r in np.linspace(0, 1, ROUGHNESS_STEPS)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        rows = list(pool.map(lambda alpha: directional_albedo(cosines(), alpha, resolution)[:, 1:], alphas))
+    rows = in_parallel(lambda alpha: directional_albedo(cosines(), alpha, resolution)[:, 1:], alphas)
     return np.stack(rows).astype(np.float32)
 
 

@@ -16,7 +16,6 @@ import os
 import re
 import resource
 import time
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,11 +23,17 @@ from typing import Any
 
 import numpy as np
 import OpenEXR
+import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from stages.core.errors import ArtifactError, InputError, OutputError
+from stages.core.archive import UNREADABLE, ForeignMember, read_member, read_members
+from stages.core.errors import ArtifactError, InputError, OutputError, one_line
 
 MANIFEST = "manifest.json"
+SEAL = "sha256"
+"""The manifest's key for the hash of all its other content."""
+
+oiio.attribute("threads", 1)  # who reads files has threads of their own
 
 
 @dataclass(frozen=True)
@@ -36,11 +41,14 @@ class Field:
     """One array of an artefact.
 
     dtype: NumPy dtype string, such as "f4". shape: sizes; a letter stands for any size, the same wherever it recurs.
+    rows_of: where the values are row numbers, the letter of the size that they stay below. least: the smallest of them.
     """
 
     dtype: str
     shape: tuple[int | str, ...]
     finite: bool = True
+    rows_of: str = ""
+    least: int = 0
 
 
 @dataclass(frozen=True)
@@ -155,9 +163,17 @@ def write_json(path: Path, content: Any) -> None:
 def read_json(path: Path) -> Any:
     """The content of a JSON file, or None when there is none that can be read."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return _parsed(path.read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
+
+
+def _parsed(text: str) -> Any:
+    """JSON's content. Raises: ValueError, also where brackets are nested without end."""
+    try:
+        return json.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
 
 
 def save_npz(path: Path, schema: Schema, arrays: Mapping[str, NDArray], provenance: Provenance) -> None:
@@ -190,23 +206,25 @@ def run_log(artifact: Path) -> Iterator[dict[str, Any]]:
 
 
 def load_npz(path: Path, schema: Schema) -> Artifact:
-    """Read an NPZ artefact and check it against its schema.
+    """Read an NPZ artefact and check it against its schema; it takes no more memory than the file has bytes.
 
     Raises: ArtifactError that says what is wrong with which file.
     """
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            if not isinstance(archive, np.lib.npyio.NpzFile) or "header" not in archive.files:
-                raise ArtifactError(f"{path}: not a dreammat artefact; expected {schema.name}")
-            header = json.loads(str(archive["header"]))
-            arrays = {name: archive[name] for name in archive.files if name != "header"}
+        header = read_member(path, "header")
+        if header is None:
+            raise ArtifactError(f"{path}: not a dreammat artefact; expected {schema.name}")
+        provenance = _provenance(path, schema, _parsed(str(header)))
+        arrays = read_members(path, {"header", *schema.fields})
     except OSError as error:
         raise ArtifactError(f"{path}: {reason(error)}; expected a {schema.name} artefact") from error
-    except (ValueError, zipfile.BadZipFile, EOFError, KeyError, zipfile.error) as error:
+    except ForeignMember as error:
+        raise ArtifactError(f"{path}: not a {schema.name} artefact: {error}; make it again") from error
+    except UNREADABLE as error:
         raise ArtifactError(
             f"{path}: not a readable {schema.name} artefact (damaged, or another kind of file); make it again"
         ) from error
-    provenance = _provenance(path, schema, header)
+    del arrays["header"]
     problem = schema_problem(schema, arrays) or extra_problem(schema, provenance)
     if problem:
         raise ArtifactError(f"{path}: {problem}; make it again with the stage before")
@@ -255,7 +273,18 @@ def schema_problem(schema: Schema, arrays: Mapping[str, NDArray]) -> str | None:
         if spec.finite and array.dtype.kind == "f" and not np.isfinite(array).all():
             return f"array '{name}' holds {int((~np.isfinite(array)).sum())} values that are not finite"
     unknown = set(arrays) - set(schema.fields)
-    return f"array '{sorted(unknown)[0]}' is not part of {schema.name}" if unknown else None
+    if unknown:
+        return f"array '{sorted(unknown)[0]}' is not part of {schema.name}"
+    return next(filter(None, (_row_problem(name, spec, arrays[name], sizes) for name, spec in schema.fields.items())), None)
+
+
+def _row_problem(name: str, spec: Field, array: NDArray, sizes: Mapping[str, int]) -> str | None:
+    """Whether an array that holds row numbers points outside the rows that there are."""
+    if not spec.rows_of or not array.size:
+        return None
+    low, high, count = int(array.min()), int(array.max()), sizes[spec.rows_of]
+    wrong = low if low < spec.least else high
+    return f"array '{name}' points at row {wrong} of {count}" if low < spec.least or high >= count else None
 
 
 def extra_problem(schema: Schema, provenance: Provenance) -> str | None:
@@ -275,19 +304,20 @@ def _provenance(path: Path, schema: Schema, header: Any) -> Provenance:
         raise ArtifactError(
             f"{path}: {schema.name} version {header.get('version')}, expected {schema.version}; make it again"
         )
-    try:
-        return Provenance(**{key: header[key] for key in ("options", "seed", "inputs", "extra")})
-    except KeyError as error:
-        raise ArtifactError(f"{path}: its header lacks {error}; make it again with the stage before") from error
+    for key, kind in (("options", dict), ("seed", int | None), ("inputs", dict), ("extra", dict)):
+        if key not in header or not isinstance(header[key], kind):
+            raise ArtifactError(f"{path}: its header has no usable '{key}'; make it again with the stage before")
+    return Provenance(**{key: header[key] for key in ("options", "seed", "inputs", "extra")})
 
 
 # ---------------------------------------------------------------------------------------------------- folders
 
 
 def write_manifest(folder: Path, schema: Schema, provenance: Provenance, files: list[str]) -> None:
-    """Complete a folder artefact: record provenance and the SHA-256 of each of its files (relative paths)."""
+    """Complete a folder artefact: record provenance, the SHA-256 of each of its files (relative paths), and its own."""
     hashes = {name: sha256_file(folder / name) for name in sorted(files)}
-    write_json(folder / schema.manifest, {**_header(schema, provenance), "files": hashes})
+    content = {**_header(schema, provenance), "files": hashes}
+    write_json(folder / schema.manifest, {**content, SEAL: seal_of(content)})
 
 
 def read_manifest(folder: Path, schema: Schema) -> tuple[Provenance, dict[str, str]]:
@@ -297,20 +327,49 @@ def read_manifest(folder: Path, schema: Schema) -> tuple[Provenance, dict[str, s
     """
     path = folder / schema.manifest
     try:
-        header = json.loads(path.read_text(encoding="utf-8"))
+        header = _parsed(path.read_text(encoding="utf-8"))
     except OSError as error:
         hint = "an interrupted run continues with the same command" if folder.is_dir() else f"expected {schema.name}"
         raise ArtifactError(f"{path}: {reason(error)}; {hint}") from error
     except ValueError as error:
         raise ArtifactError(f"{path}: not readable ({error}); make it again with the stage before") from error
     provenance = _provenance(path, schema, header)
+    if header.pop(SEAL, None) != seal_of(header):
+        raise ArtifactError(f"{path}: changed since it was written; make it again with the stage before")
     files = header.get("files")
     if not isinstance(files, dict):
         raise ArtifactError(f"{path}: lists no files; make it again with the stage before")
+    outside = next((name for name in files if Path(name).is_absolute() or ".." in Path(name).parts), None)
+    if outside:
+        raise ArtifactError(f"{path}: lists '{outside[:80]}', which is not within the folder; make it again")
     missing = next((name for name in files if not (folder / name).is_file()), None)
     if missing:
         raise ArtifactError(f"{folder / missing}: missing, though the manifest lists it; make it again with --force")
     return provenance, files
+
+
+def seal_of(content: dict[str, Any]) -> str:
+    """SHA-256 of a manifest's content, so that a flipped bit in a name or number does not pass for another request."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def intact(folder: Path, name: str, files: Mapping[str, str]) -> Path:
+    """The path of a file of a folder artefact, once its bytes are known to be those that the manifest lists.
+
+    Args:
+        files: of `read_manifest`.
+    Raises: ArtifactError.
+    """
+    path = folder / name
+    if name not in files:
+        raise ArtifactError(f"{path}: not listed in the folder's manifest; make it again with --force")
+    try:
+        found = sha256_file(path)
+    except InputError as error:
+        raise ArtifactError(str(error)) from error
+    if found != files[name]:
+        raise ArtifactError(f"{path}: damaged, its bytes are not those that the manifest lists; make it again with --force")
+    return path
 
 
 # ---------------------------------------------------------------------------------------------------- EXR
@@ -351,37 +410,70 @@ def write_exr(
 
 @dataclass(frozen=True)
 class ExrImage:
-    """Channels of an EXR file: name -> (h, w), the crop's (row, column) offset, the whole image's size, the header."""
+    """An EXR file: pixels (h, w, C), their channels' names, the crop's (row, column) offset, the whole image's size, strings.
 
-    channels: dict[str, NDArray]
+    Channels of several types are all given in the widest.
+    """
+
+    pixels: NDArray
+    names: tuple[str, ...]
     offset: tuple[int, int]
     display: tuple[int, int]
     attributes: dict[str, Any]
 
+    @property
+    def channels(self) -> dict[str, NDArray]:
+        """Name -> (h, w)."""
+        return {name: self.pixels[..., i] for i, name in enumerate(self.names)}
+
+    def select(self, names: list[str], mask: NDArray[np.bool_]) -> NDArray:
+        """Values of some channels at the crop's pixels in a mask, row by row. Args: mask: (h, w). Returns: (P, len(names))."""
+        at = {name: i for i, name in enumerate(self.names)}
+        return np.take(self.pixels[mask], [at[name] for name in names], axis=1)
+
     def full(self, name: str) -> NDArray:
         """A channel at the whole image's size, 0 outside the crop."""
-        image = np.zeros(self.display, self.channels[name].dtype)
-        h, w = self.channels[name].shape
+        channel = self.channels[name]
+        image = np.zeros(self.display, channel.dtype)
+        h, w = channel.shape
         top, left = self.offset
-        image[top : top + h, left : left + w] = self.channels[name]
+        image[top : top + h, left : left + w] = channel
         return image
 
 
-def read_exr(path: Path, error_type: type[ArtifactError] | type[InputError] = ArtifactError) -> ExrImage:
-    """Read all channels of an EXR file.
+def read_exr(path: Path) -> ExrImage:
+    """Read all channels of an EXR artefact.
 
-    Raises: `error_type` (ArtifactError for our own files, InputError for the user's) that names file and cause.
+    By OpenImageIO, which keeps what it finds wrong for its caller, where OpenEXR prints; and which refuses a header that
+    announces more than the file can hold.
+
+    Raises: ArtifactError that names file and cause.
     """
     try:
         with open(path, "rb"):
             pass
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            header = dict(file.header())
-            channels = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
     except OSError as error:
-        raise error_type(f"{path}: {reason(error)}") from error
-    except Exception as error:  # the binding raises whatever the C++ library throws
-        raise error_type(f"{path}: not a readable EXR file ({str(error).splitlines()[0][:120]})") from error
-    (left, top), _ = header["dataWindow"]
-    (x0, y0), (x1, y1) = header["displayWindow"]
-    return ExrImage(channels, (int(top - y0), int(left - x0)), (int(y1 - y0 + 1), int(x1 - x0 + 1)), header)
+        raise ArtifactError(f"{path}: {reason(error)}") from error
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        raise ArtifactError(f"{path}: not a readable EXR file ({one_line(oiio.geterror())}); make it again")
+    spec = source.spec()
+    pixels = source.read_image(spec.format)
+    problem = source.geterror()
+    source.close()
+    if pixels is None:
+        raise ArtifactError(f"{path}: not a readable EXR file ({one_line(problem)}); make it again")
+    top, left = spec.y - spec.full_y, spec.x - spec.full_x
+    if top < 0 or left < 0 or top + spec.height > spec.full_height or left + spec.width > spec.full_width:
+        raise ArtifactError(f"{path}: its data window is not within its display window; make it again")
+    attributes = {attribute.name: attribute.value for attribute in spec.extra_attribs}
+    return ExrImage(pixels, spec.channelnames, (top, left), (spec.full_height, spec.full_width), attributes)
+
+
+def is_readable_exr(path: Path) -> bool:
+    """Whether a file is there of which every pixel can be read."""
+    try:
+        read_exr(path)
+    except ArtifactError:
+        return False
+    return True

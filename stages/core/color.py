@@ -1,4 +1,5 @@
-"""Transfer curves, and luminance. Inside the program all is linear Rec. 709; a curve is applied where a file or model asks.
+"""Transfer curves, luminance, primaries. Inside the program all is linear Rec. 709; what a file or model has or wants otherwise
+is converted where it is read or written.
 
 Curves work on NumPy arrays and torch tensors alike, element by element, and keep dtype and device.
 """
@@ -7,6 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 import torch
+from numpy.typing import ArrayLike, NDArray
 
 Array = TypeVar("Array", np.ndarray, torch.Tensor)
 
@@ -38,6 +40,40 @@ def luminance(rgb: Array) -> Array:
     """Rec. 709 luminance of linear RGB. Args: rgb (..., 3). Returns: (...)."""
     r, g, b = LUMINANCE
     return r * rgb[..., 0] + g * rgb[..., 1] + b * rgb[..., 2]
+
+
+REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+"""CIE 1931 x and y of red, green, blue and white, as files give them; the white is D65."""
+
+_BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]])
+
+
+def rgb_to_xyz(chromaticities: ArrayLike) -> NDArray[np.float64]:
+    """The matrix (3, 3) from linear RGB to CIE XYZ, white at Y = 1. Source: SMPTE RP 177 (1993).
+
+    Args:
+        chromaticities: x and y of red, green, blue and white.
+    Raises: ValueError where these span no colours.
+    """
+    x, y = np.asarray(chromaticities, np.float64).reshape(4, 2).T
+    if not np.isfinite([x, y]).all() or (y == 0).any():
+        raise ValueError("they are no colours")
+    xyz = np.stack([x / y, np.ones(4), (1 - x - y) / y])
+    if abs(np.linalg.det(xyz[:, :3])) < 1e-6:
+        raise ValueError("they lie on one line")
+    return xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
+
+
+def to_rec709(chromaticities: ArrayLike) -> NDArray[np.float64]:
+    """The matrix (3, 3) from linear RGB of other primaries to linear Rec. 709; what is neutral stays so.
+
+    Source: von Kries in the Bradford cone space (Lam 1985).
+    Raises: ValueError as `rgb_to_xyz`.
+    """
+    source, target = rgb_to_xyz(chromaticities), rgb_to_xyz(REC709)
+    cones = _BRADFORD @ np.stack([source.sum(1), target.sum(1)], 1)
+    adapt = np.linalg.inv(_BRADFORD) @ np.diag(cones[:, 1] / cones[:, 0]) @ _BRADFORD
+    return np.linalg.inv(target) @ adapt @ source
 
 
 DARKEST = 1e-4

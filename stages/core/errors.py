@@ -35,6 +35,6 @@ class NumericalError(DreammatError):
     exit_code = 6
 
 
-def one_line(error: BaseException) -> str:
-    """What another library's exception says, short enough to be part of a line."""
+def one_line(error: BaseException | str) -> str:
+    """What another library says, short enough to be part of a line."""
     return " ".join(str(error).split())[:160] or type(error).__name__

@@ -4,14 +4,12 @@ Levels own disjoint parts of the table, so threads that take whole levels never 
 order whatever the number of threads. Kernels release the interpreter lock.
 """
 
-import numba
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from stages.core.parallel import run_parallel, slices
+from stages.core.parallel import compiled, in_parallel, slices
 
-POINTS_PER_TASK = 1 << 14
+POINTS_PER_TASK = 1 << 11
 PRIME_Y, PRIME_Z = np.uint32(2654435761), np.uint32(805459861)  # of stages.core.field.HASH_PRIMES
 
 Rows = NDArray[np.int64]
@@ -21,8 +19,7 @@ Values = NDArray[np.float32]
 def encode(p: Values, table: Values, layout: Rows) -> Values:
     """Features (levels * 2, N) of points p (N, 3); see `stages.core.field.encode_reference`."""
     out = np.empty((2 * len(layout), len(p)), np.float32)
-    parts = slices(len(p), POINTS_PER_TASK)
-    run_parallel(_encode, [(p[part], table, layout, out[:, part]) for part in parts])
+    in_parallel(lambda part: _encode(p[part], table, layout, out[:, part]), slices(len(p), POINTS_PER_TASK))
     return out
 
 
@@ -34,27 +31,20 @@ def encode_backward(p: Values, gradient: Values, layout: Rows) -> tuple[Rows, Va
     Returns:
         rows: (R,) ascending, each once. values: (R, 2).
     """
-    threads = torch.get_num_threads()
-    parts = run_parallel(_levels_backward, [(p, gradient, layout, i, threads) for i in range(threads)])
-    by_level = sorted((part for group in parts for part in group), key=lambda part: part[0])
-    return np.concatenate([rows for _, rows, _ in by_level]), np.concatenate([values for _, _, values in by_level])
 
-
-def _levels_backward(p: Values, gradient: Values, layout: Rows, first: int, step: int) -> list[tuple[int, Rows, Values]]:
-    """Rows and values of every step-th level, with its number."""
-    largest = int(layout[:, 2].max())
-    sums, touched = np.zeros((largest, 2), np.float32), np.zeros(largest, np.bool_)
-    parts = []
-    for level in range(first, len(layout), step):
+    def level_backward(level: int) -> tuple[Rows, Values]:
         resolution, start, entries = map(int, layout[level])
+        sums, touched = np.zeros((entries, 2), np.float32), np.zeros(-(-entries // 64), np.uint64)
         count = _scatter(p, gradient, level, resolution, entries, sums, touched)
         rows, values = np.empty(count, np.int64), np.empty((count, 2), np.float32)
-        _collect(sums, touched, start, entries, rows, values)
-        parts.append((level, rows, values))
-    return parts
+        _collect(sums, touched, start, rows, values)
+        return rows, values
+
+    parts = in_parallel(level_backward, range(len(layout)))
+    return np.concatenate([rows for rows, _ in parts]), np.concatenate([values for _, values in parts])
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _axis(position, resolution):  # type: ignore[no-untyped-def]
     """Cell and fraction of one coordinate, clamped to the box."""
     x = min(max(position + np.float32(0.5), np.float32(0.0)), np.float32(1.0)) * np.float32(resolution)
@@ -62,7 +52,7 @@ def _axis(position, resolution):  # type: ignore[no-untyped-def]
     return cell, x - np.float32(cell)
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _corners(p, resolution, entries, rows, weights):  # type: ignore[no-untyped-def]
     """Rows (8,), within their level, and weights (8,) of the corners of the cell around point p (3,)."""
     x, fx = _axis(p[0], resolution)
@@ -85,7 +75,7 @@ def _corners(p, resolution, entries, rows, weights):  # type: ignore[no-untyped-
         weights[c] = wx * wy * wz
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _encode(p, table, layout, out):  # type: ignore[no-untyped-def]
     rows, weights = np.empty(8, np.int64), np.empty(8, np.float32)
     for level in range(len(layout)):
@@ -100,9 +90,9 @@ def _encode(p, table, layout, out):  # type: ignore[no-untyped-def]
             out[2 * level + 1, i] = b
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _scatter(p, gradient, level, resolution, entries, sums, touched):  # type: ignore[no-untyped-def]
-    """Add one level's gradients into `sums` and mark its rows. Returns: how many rows were marked."""
+    """Add one level's gradients into `sums` and mark its rows, a bit each. Returns: how many rows were marked."""
     rows, weights = np.empty(8, np.int64), np.empty(8, np.float32)
     count = 0
     for i in range(len(p)):
@@ -111,19 +101,20 @@ def _scatter(p, gradient, level, resolution, entries, sums, touched):  # type: i
             row = rows[c]
             sums[row, 0] += weights[c] * gradient[2 * level, i]
             sums[row, 1] += weights[c] * gradient[2 * level + 1, i]
-            count += not touched[row]
-            touched[row] = True
+            bit = np.uint64(1) << np.uint64(row & 63)
+            count += (touched[row >> 6] & bit) == 0
+            touched[row >> 6] |= bit
     return count
 
 
-@numba.njit(nogil=True, cache=True)
-def _collect(sums, touched, start, entries, rows, values):  # type: ignore[no-untyped-def]
-    """Move the marked rows out of `sums`, in ascending order, and clear them."""
+@compiled
+def _collect(sums, touched, start, rows, values):  # type: ignore[no-untyped-def]
+    """The marked rows of `sums`, in ascending order."""
     k = 0
-    for row in range(entries):
-        if touched[row]:
-            rows[k] = start + row
-            values[k, 0], values[k, 1] = sums[row, 0], sums[row, 1]
-            sums[row, 0] = sums[row, 1] = np.float32(0.0)
-            touched[row] = False
-            k += 1
+    for word in range(len(touched)):
+        if touched[word]:
+            for row in range(64 * word, min(64 * word + 64, len(sums))):
+                if touched[word] >> np.uint64(row & 63) & np.uint64(1):
+                    rows[k] = start + row
+                    values[k, 0], values[k, 1] = sums[row, 0], sums[row, 1]
+                    k += 1

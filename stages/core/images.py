@@ -1,5 +1,6 @@
 """Eight-bit and HDR pictures through OpenImageIO: PNG out and in, Radiance HDR in."""
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,17 @@ def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
             raise OSError(output.geterror() or "the PNG writer failed")
 
 
+def decode_image(data: bytes) -> NDArray[np.float32]:
+    """The pixels of a PNG or JPEG file's bytes, as stored: (H, W, C) float32, integers scaled to [0, 1].
+
+    Raises: InputError.
+    """
+    with tempfile.NamedTemporaryFile(suffix=".png" if data.startswith(b"\x89PNG") else ".jpg") as file:
+        file.write(data)
+        file.flush()
+        return read_image(Path(file.name))
+
+
 def read_image(path: Path) -> NDArray[np.float32]:
     """Read any picture OpenImageIO knows, integers scaled to [0, 1].
 
@@ -40,7 +52,9 @@ def read_image(path: Path) -> NDArray[np.float32]:
         (H, W, C) float32, values as stored (no transfer curve applied).
     Raises: InputError.
     """
-    source = oiio.ImageInput.open(str(path))
+    as_stored = oiio.ImageSpec()
+    as_stored["oiio:UnassociatedAlpha"] = 1  # else colours come multiplied by alpha
+    source = oiio.ImageInput.open(str(path), as_stored)
     if source is None:
         raise InputError(f"{path}: not a readable picture ({oiio.geterror().strip().splitlines()[0]})")
     pixels = source.read_image("float")

@@ -2,14 +2,13 @@
 
 import functools
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.core import albedo
-from stages.core.parallel import run_parallel, slices
+from stages.core.parallel import compiled, in_parallel, slices
 
-ROWS_PER_TASK = 1 << 14
+ROWS_PER_TASK = 1 << 11
 
 Values = NDArray[np.float32]
 
@@ -44,11 +43,12 @@ def shade(
     out = tuple(np.empty((count, 3), np.float32) for _ in range(3))
     tables = (_knot_table(knots), albedo.table(), np.array(knots, np.float32), slopes.astype(np.float32))
     floats = tuple(map(np.float32, constants))
-    tasks = [
-        (part.start, lights, *(t[part] for t in transport), *material, *tables, *floats, *(o[part] for o in out))
-        for part in slices(count, ROWS_PER_TASK)
-    ]
-    run_parallel(_shade, tasks)
+
+    def task(part: slice) -> None:
+        given = (t[part] for t in transport)
+        _shade(part.start, lights, *given, *material, *tables, *floats, *(o[part] for o in out))
+
+    in_parallel(task, slices(count, ROWS_PER_TASK))
     return out  # type: ignore[return-value]
 
 
@@ -60,16 +60,17 @@ def shade_backward(
     points = len(roughness)
     out = (np.empty((points, 3), np.float32), np.empty(points, np.float32), np.empty(points, np.float32))
     lights = len(gradient) // max(points, 1)
-    tasks = []
-    for part in slices(points, ROWS_PER_TASK):
+
+    def task(part: slice) -> None:
         rows = slice(part.start * lights, part.stop * lights)
         given = (gradient[rows], E[rows], A[rows], by_roughness[rows], c[part], metallic[part])
-        tasks.append((lights, *given, np.float32(f0), *(o[part] for o in out)))
-    run_parallel(_shade_backward, tasks)
+        _shade_backward(lights, *given, np.float32(f0), *(o[part] for o in out))
+
+    in_parallel(task, slices(points, ROWS_PER_TASK))
     return out
 
 
-@numba.njit(nogil=True, cache=True, error_model="numpy")
+@compiled
 def _shade(  # type: ignore[no-untyped-def]
     first, lights, E, A, B, cosine, c, roughness, metallic, knot_table, table, knots, slopes, f0, least, dark, tiny, soften,
     bulge, out, out_a, out_r
@@ -128,7 +129,7 @@ def _shade(  # type: ignore[no-untyped-def]
             out_r[i, j] = f * slope[0] + slope[1]
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _shade_backward(  # type: ignore[no-untyped-def]
     lights, gradient, E, A, by_roughness, c, metallic, f0, out_c, out_r, out_m
 ):

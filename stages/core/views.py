@@ -11,6 +11,8 @@ The data window is cropped to the object. Half floats end at 65,504, so radiance
 that the attribute "dreammat_scale" names.
 """
 
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,7 +21,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
-from stages.core.artifact import ExrImage, read_exr, write_exr
+from stages.core.artifact import ExrImage, intact, read_exr, write_exr
 from stages.core.errors import ArtifactError
 from stages.core.shading import KNOTS, LIGHT_MAPS, Transport
 
@@ -29,6 +31,9 @@ SD = "sd"
 LARGEST_STORED = 32768.0
 """Stored radiance stays at or under this, well inside half float's range."""
 
+
+LARGEST_VIEW = 4096
+"""Pixels along a side of the largest view that `conditions` makes."""
 
 DROPPED = 3
 """Bits of a half float's significand that are not stored: what is left errs by 0.2 % and packs a third smaller."""
@@ -64,12 +69,19 @@ def write_geometry(folder: Path, view: int, geometry: Geometry, profile: str = "
     _write(folder / view_folder(view) / profile / "geometry.exr", channels, geometry.mask.shape, window, {})
 
 
-def read_geometry(folder: Path, view: int, profile: str = "") -> Geometry:
-    """Read view_NNN/<profile>/geometry.exr. Raises: ArtifactError."""
-    path = folder / view_folder(view) / profile / "geometry.exr"
+def read_geometry(folder: Path, view: int, profile: str = "", files: Mapping[str, str] | None = None) -> Geometry:
+    """Read view_NNN/<profile>/geometry.exr.
+
+    Args:
+        files: hashes from the manifest of a finished folder, which the file must have.
+    Raises: ArtifactError.
+    """
+    path = _checked(folder, Path(view_folder(view), profile, "geometry.exr"), files)
     image = read_exr(path)
     names = ["depth", "mask", *(f"normal.{c}" for c in "RGB")]
     _expect(path, image, names)
+    if max(image.display) > LARGEST_VIEW:
+        raise ArtifactError(f"{path}: announces {image.display[1]} x {image.display[0]} pixels; make the conditions again")
     depth, mask, *normal = (image.full(name) for name in names)
     return Geometry(mask > 0.5, depth, np.stack(normal, -1))
 
@@ -91,12 +103,16 @@ def write_transport(folder: Path, view: int, environment: str, mask: NDArray[np.
     _write_radiance(path, transport_channels(), mask, transport.packed(), plain=1)
 
 
-def read_transport(folder: Path, view: int, environment: str, mask: NDArray[np.bool_]) -> Transport:
+def read_transport(
+    folder: Path, view: int, environment: str, mask: NDArray[np.bool_], files: Mapping[str, str] | None = None
+) -> Transport:
     """Transport of the mask's pixels, row by row, as float32 (or float16 where the file's scale is 1).
 
+    Args:
+        files: as for `read_geometry`.
     Raises: ArtifactError.
     """
-    path = folder / view_folder(view) / f"{environment}.exr"
+    path = _checked(folder, Path(view_folder(view), f"{environment}.exr"), files)
     return Transport.unpack(_read_radiance(path, transport_channels(), mask, plain=1))
 
 
@@ -106,9 +122,16 @@ def write_light_maps(folder: Path, view: int, environment: str, mask: NDArray[np
     _write_radiance(path, _light_map_channels(), mask, maps.flatten(1).clone(), plain=0)
 
 
-def read_light_maps(folder: Path, view: int, environment: str, mask: NDArray[np.bool_], profile: str) -> Tensor:
+def read_light_maps(
+    folder: Path,
+    view: int,
+    environment: str,
+    mask: NDArray[np.bool_],
+    profile: str,
+    files: Mapping[str, str] | None = None,
+) -> Tensor:
     """Light maps of the mask's pixels, (P, 6, 3) as `read_transport`. Raises: ArtifactError."""
-    path = folder / view_folder(view) / profile / f"{environment}.exr"
+    path = _checked(folder, Path(view_folder(view), profile, f"{environment}.exr"), files)
     return _read_radiance(path, _light_map_channels(), mask, plain=0).unflatten(1, (-1, 3))
 
 
@@ -144,16 +167,32 @@ def _read_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], plain:
     _expect(path, image, names)
     window = object_window(mask)
     inside = mask[window]
-    if image.channels[names[0]].shape != inside.shape or image.display != mask.shape:
+    if image.pixels.shape[:2] != inside.shape or image.display != mask.shape:
         raise ArtifactError(f"{path}: does not cover the object of its geometry.exr; make the conditions again")
-    values = np.stack([image.channels[name][inside] for name in names], 1)
+    values = image.select(names, inside)
     if not np.isfinite(values).all():
         raise ArtifactError(f"{path}: holds values that are not finite; make the conditions again")
-    scale = float(image.attributes.get("dreammat_scale", "1.0"))
+    scale = _scale(path, image)
     if scale != 1.0:
         values = values.astype(np.float32)
         values[:, : values.shape[1] - plain] *= scale
     return torch.from_numpy(values)
+
+
+def _scale(path: Path, image: ExrImage) -> float:
+    """What stored radiance is to be multiplied by. Raises: ArtifactError."""
+    told = str(image.attributes.get("dreammat_scale", "1.0"))
+    try:
+        scale = float(told)
+    except ValueError:
+        scale = math.nan
+    if not 0.0 < scale < math.inf:
+        raise ArtifactError(f"{path}: its radiance is scaled by '{told[:20]}', expected a number; make the conditions again")
+    return scale
+
+
+def _checked(folder: Path, name: Path, files: Mapping[str, str] | None) -> Path:
+    return folder / name if files is None else intact(folder, name.as_posix(), files)
 
 
 def _write(
@@ -167,6 +206,6 @@ def _write(
 
 
 def _expect(path: Path, image: ExrImage, names: list[str]) -> None:
-    missing = next((name for name in names if name not in image.channels), None)
+    missing = next((name for name in names if name not in image.names), None)
     if missing:
         raise ArtifactError(f"{path}: channel '{missing}' is missing; make the conditions again")

@@ -97,7 +97,10 @@ def resume(out: Path, state: State, request: Provenance) -> bool:
 
 
 def _fits(stored: Artifact, state: State) -> bool:
-    return all(stored[name].shape == tuple(p.shape) for name, p in state.field.named_parameters())
+    """Whether a checkpoint is of this field, and its counts of steps can be counts."""
+    shapes = all(stored[name].shape == tuple(p.shape) for name, p in state.field.named_parameters())
+    counts = [array for name, array in stored.arrays.items() if name.startswith("count.")]
+    return shapes and all(int(array.min()) >= 0 and int(array.max()) <= len(stored["loss"]) for array in counts)
 
 
 @contextlib.contextmanager

@@ -7,13 +7,12 @@ entry, all features), and a network parameter is one single row that has a gradi
 Sources: Kingma & Ba 2015, "Adam", Algorithm 1; Müller et al. 2022, Section 4, and tiny-cuda-nn's adam.h.
 """
 
-import numba
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from stages.core.parallel import run_parallel
+from stages.core.parallel import compiled, in_parallel, slices
 
 BETAS = (0.9, 0.99)
 EPS = 1e-15
@@ -85,12 +84,11 @@ def update_rows_reference(state: State, rows: Tensor, gradient: Tensor, rates: T
 
 def update_rows(state: State, rows: Tensor, gradient: Tensor, rates: Tensor) -> None:
     """`update_rows_reference` on the CPU in float32, compiled."""
-    arrays = tuple(tensor.numpy() for tensor in (*state, rates))
-    parts = list(zip(rows.split(ROWS_PER_TASK), gradient.split(ROWS_PER_TASK), strict=True))
-    run_parallel(_update, [(*arrays, some.numpy(), values.numpy()) for some, values in parts])
+    arrays, chosen, values = tuple(tensor.numpy() for tensor in (*state, rates)), rows.numpy(), gradient.numpy()
+    in_parallel(lambda part: _update(*arrays, chosen[part], values[part]), slices(len(chosen), ROWS_PER_TASK))
 
 
-@numba.njit(nogil=True, cache=True)
+@compiled
 def _update(parameter, m, v, count, rates, rows, gradient):  # type: ignore[no-untyped-def]
     beta1, beta2, eps = np.float32(BETAS[0]), np.float32(BETAS[1]), np.float32(EPS)
     one = np.float32(1.0)
@@ -108,8 +106,10 @@ def _update(parameter, m, v, count, rates, rows, gradient):  # type: ignore[no-u
 def _rows_with_gradient(gradient: Tensor, table: bool) -> tuple[Tensor, Tensor]:
     """Rows (K,) that have a gradient, and it (K, C)."""
     if gradient.is_sparse:
-        gradient = gradient.coalesce()
-        return gradient.indices()[0], gradient.values()
+        listed = gradient._indices()[0]
+        if not bool((listed[1:] > listed[:-1]).all()):  # autograd forgets that the kernels list each row once, in order
+            gradient = gradient.coalesce()
+        return gradient._indices()[0], gradient._values()
     rows = gradient if table else gradient.reshape(1, -1)
     touched = (rows != 0).any(1).nonzero()[:, 0]
     return touched, rows[touched]

@@ -8,7 +8,7 @@ square; zoomed crops halve it down to single pixels and are centred on an object
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -50,7 +50,8 @@ class Sample:
     """What one step shows: P points (P, 3) with normals (P, 3), world, each under `lights` = L lights.
 
     transport: of P L rows, all lights of a point after each other. source: (view, environment) of each image, for messages.
-    images: the layout of crops; rows: (P,) of loose pixels in their pool. The one that does not apply is None.
+    images: the layout of crops; rows: (P,) of loose pixels in their pool. The one that does not apply is None. given: what the
+    guidance makes of the rest before it is asked.
     """
 
     points: Tensor
@@ -60,6 +61,7 @@ class Sample:
     source: tuple[tuple[int, int], ...] = ()
     images: Images | None = None
     rows: Tensor | None = None
+    given: Any = None
 
     def at(self, chosen: Tensor) -> "Sample":
         """The same of some loose pixels. Args: chosen: (Q,) of the sample's points."""

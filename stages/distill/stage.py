@@ -16,6 +16,7 @@ from torch import Tensor
 from stages.core.artifact import Provenance, peek, plain_options, run_log, save_npz, write_text
 from stages.core.errors import InputError, NumericalError
 from stages.core.field import FieldConfig, MaterialField
+from stages.core.parallel import ahead, cores
 from stages.core.progress import Progress, silent
 from stages.core.schemas import MATERIAL
 from stages.core.shading import Material, shade
@@ -80,6 +81,11 @@ def distill(
 
     Raises: InputError, ArtifactError, OutputError, NumericalError; KeyboardInterrupt after saving a checkpoint.
     """
+    with torch_threads(cores() if options.guidance == "sd" else 1):
+        return _distill(conditions, out, options, force, progress)
+
+
+def _distill(conditions: Path, out: Path, options: DistillOptions, force: bool, progress: Progress) -> DistillResult:
     device = chosen_device(options)
     views = Views(conditions)
     guidance = make_guidance(options, views, device)
@@ -101,6 +107,21 @@ def distill(
         log |= {"milliseconds_per_step": clock.per_step(state.step - resumed), "steps": state.step, "resumed": resumed}
     checkpoint.checkpoint_path(out).unlink(missing_ok=True)
     return DistillResult(state.step, resumed, state.loss[-1], False)
+
+
+@contextlib.contextmanager
+def torch_threads(count: int) -> Iterator[None]:
+    """Within the block torch's operators run on so many threads each.
+
+    On one they give the same bytes on any number of cores, and a small model's operators are hardly faster on more: torch's
+    threads spin between them, which starves every other job. A large model's gain, and give the same bytes on as many cores.
+    """
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def chosen_budget(options: DistillOptions, called_for: Budget) -> Budget:
@@ -164,8 +185,8 @@ def _all_steps(run: Run, progress: Progress) -> None:
     state, saved = run.state, time.perf_counter()
     with checkpoint.interruptions() as interrupted:
         try:
-            while state.step < run.budget.steps:
-                loss = optimisation_step(run)
+            for sample, generator in ahead(lambda step: draw(run, step), range(state.step, run.budget.steps)):
+                loss = optimisation_step(run, sample, generator)
                 state.loss.append(loss)
                 state.seconds.append(run.clock.elapsed())
                 progress(f"distill (loss {loss:.4f})", state.step, run.budget.steps)
@@ -180,13 +201,18 @@ def _all_steps(run: Run, progress: Progress) -> None:
             raise
 
 
-def optimisation_step(run: Run) -> float:
-    """One step: draw, shade, ask the guidance, update. Returns: the guidance's number for the curve."""
+def draw(run: Run, step: int) -> tuple[Sample, torch.Generator]:
+    """What a step shows, and the generator that draws the rest. No field enters: it is found while the step before is done."""
+    generator = step_generator(run.options.seed, step)
+    with run.clock("data"):
+        sample = run.guidance.draw(generator)
+        run.guidance.sampler.prefetch(step_generator(run.options.seed, step + 1))
+    return sample, generator
+
+
+def optimisation_step(run: Run, sample: Sample, generator: torch.Generator) -> float:
+    """One step: shade, ask the guidance, update. Returns: the guidance's number for the curve."""
     state, options, clock = run.state, run.options, run.clock
-    generator = step_generator(options.seed, state.step)
-    with clock("data"):
-        sample = run.guidance.sampler.draw(generator)
-        run.guidance.sampler.prefetch(step_generator(options.seed, state.step + 1))
     with clock("field"):
         material, nearby = _materials(state.field, sample, options, generator)
     with clock("shading"):
@@ -198,14 +224,22 @@ def optimisation_step(run: Run) -> float:
     with clock("backward"):
         losses = _regularizers(material, nearby, sample, response, run)
         if response.curvature is None:
-            torch.autograd.backward([radiance, *losses], [response.gradient, *[None] * len(losses)])
+            pull(radiance, response.gradient, losses)
         else:
             values = material.columns()
             goal = _goal(run, response, sample, values.detach(), generator)
-            torch.autograd.backward([values, *losses], [logit_gradient(values.detach(), goal), *[None] * len(losses)])
+            pull(values, logit_gradient(values.detach(), goal), losses)
     with clock("optimiser"):
         state.optimizer.step(run.budget.learning_rate * schedule.learning_rate(run.progress))
     return response.loss
+
+
+def pull(values: Tensor, gradient: Tensor, losses: list[Tensor]) -> None:
+    """Bring the gradient by some values, and those of losses, to the parameters behind them.
+
+    As one number: gradients that are given as tensors make torch load its symbolic algebra, which takes a second.
+    """
+    sum(losses, (values * gradient).sum()).backward()
 
 
 def _goal(run: Run, response: Response, sample: Sample, values: Tensor, generator: torch.Generator) -> Tensor:

@@ -13,6 +13,7 @@ from torch import Tensor
 from stages.core.color import log_correlation
 from stages.core.convexity import SurfaceSamples
 from stages.core.field import MaterialField
+from stages.core.parallel import ahead
 from stages.core.progress import Progress
 from stages.distill.optimizer import RowAdam
 from stages.distill.regularizers import encoded
@@ -134,11 +135,14 @@ def fit(field: MaterialField, start: Start, views: Views, generator: torch.Gener
     """Bring an untrained field to the start, in place."""
     device = field.table.device
     optimizer = RowAdam(dict(field.named_parameters()), tables=frozenset({"table"}))
-    for step in range(STEPS):
-        progress("reading the words", step, STEPS)
+
+    def draw(step: int) -> tuple[Tensor, Tensor]:
         some = [views.seen[i] for i in torch.randint(len(views.seen), (VIEWS,), generator=generator).tolist()]
         points, normals = (t.to(device) for t in random_points(views, some, POINTS, generator))
-        wanted = start(points, normals)
+        return points, start(points, normals)
+
+    for step, (points, wanted) in enumerate(ahead(draw, range(STEPS))):
+        progress("reading the words", step, STEPS)
         if step == 0:
             field.begin_at(wanted.mean(0))
         found = field(points).columns()

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core import schemas
-from stages.core.artifact import MANIFEST, load_npz, read_manifest, sha256_file
+from stages.core.artifact import MANIFEST, intact, load_npz, read_manifest, sha256_file
 from stages.core.errors import ArtifactError
 from stages.core.shading import KNOTS, LIGHT_MAPS, WIDTH, Transport
 from stages.core.views import SD, read_geometry, read_light_maps, read_transport
@@ -61,8 +61,8 @@ class Views:
     """
 
     def __init__(self, folder: Path, cache_bytes: int = CACHE_BYTES) -> None:
-        provenance, _ = read_manifest(folder, schemas.CONDITIONS)
-        cameras = load_npz(folder / "cameras.npz", schemas.CAMERAS)
+        provenance, self.files = read_manifest(folder, schemas.CONDITIONS)
+        cameras = load_npz(intact(folder, "cameras.npz", self.files), schemas.CAMERAS)
         self.folder = folder
         self.digest = sha256_file(folder / MANIFEST)
         self.prep = provenance.inputs.get("prep", "")
@@ -114,7 +114,7 @@ class Views:
     def smooth_normals(self, view: int) -> Tensor:
         """View-space normals of the profile sd, of all object pixels of a view, (P, 3) float32."""
         if view not in self._smooth:
-            normal = read_geometry(self.folder, view, SD).normal.reshape(-1, 3)[self.pixels(view)]
+            normal = read_geometry(self.folder, view, SD, self.files).normal.reshape(-1, 3)[self.pixels(view)]
             self._smooth[view] = torch.from_numpy(np.ascontiguousarray(normal))
         return self._smooth[view]
 
@@ -127,7 +127,7 @@ class Views:
 
     def _read_geometry(self) -> list[_Geometry]:
         def read(view: int) -> _Geometry:
-            geometry = read_geometry(self.folder, view)
+            geometry = read_geometry(self.folder, view, files=self.files)
             mask = geometry.mask.ravel()
             if geometry.mask.shape != (self.height, self.width):
                 raise ArtifactError(f"{self.folder}: view {view} is not {self.width} x {self.height}; make it again")
@@ -140,12 +140,12 @@ class Views:
     def read_transport(self, key: tuple[int, int]) -> Transport:
         """As `transport` of a (view, environment), always from disk and not kept."""
         view, environment = key
-        transport = read_transport(self.folder, view, self.environments[environment], self._mask(view))
+        transport = read_transport(self.folder, view, self.environments[environment], self._mask(view), self.files)
         return Transport.unpack(transport.packed().clamp(max=HALF_MAX).half())
 
     def _read_maps(self, key: tuple[int, int]) -> Tensor:
         view, environment = key
-        maps = read_light_maps(self.folder, view, self.environments[environment], self._mask(view), SD)
+        maps = read_light_maps(self.folder, view, self.environments[environment], self._mask(view), SD, self.files)
         return maps.clamp(max=HALF_MAX).half()
 
     def _mask(self, view: int) -> NDArray[np.bool_]:

@@ -5,7 +5,6 @@ in question. Blender lets a path take one diffuse and one glossy bounce; of thos
 the dielectric is dark and the metal has no diffuse lobe, none is traced.
 """
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core.frames import tangent_frame
+from stages.core.parallel import cores
 from stages.core.shading import LIGHT_MAPS
 from stages.light import reconstruction
 from stages.light.blender import lifted
@@ -79,7 +79,7 @@ def add_bounce(
     rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
     parts = [order[start : start + CHUNK] for start in range(0, len(order), CHUNK)]
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         list(pool.map(lambda part: _chunk(scene, points, lights, terms, rays, pixel[part], part, mean, gap), parts))
     sums.mean[:] += mean
     sums.variance[:] += reconstruction.variance(gap, near)

@@ -12,12 +12,15 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.artifact import read_exr, write_exr
+from stages.core.artifact import reason, write_exr
 from stages.core.errors import InputError
-from stages.core.images import read_image
+from stages.light.radiance_file import read_radiance
 
 MAX_REPAIRED = 0.01
 """A file of which more than this share of pixels is not usable radiance is refused, not mended."""
+
+OUTSIDE = 1e-3
+"""A colour counts as outside Rec. 709 when its least component is below minus this share of its largest."""
 
 
 @dataclass(frozen=True)
@@ -29,15 +32,16 @@ class Environment:
 
 
 def load_environment(path: Path) -> tuple[Environment, int]:
-    """Read a latitude-longitude .hdr or .exr light and mend single bad pixels.
+    """Read a latitude-longitude .hdr or .exr light, bring it to linear Rec. 709, and mend single bad pixels.
 
-    Negative radiance and NaN become 0, infinity becomes the largest finite value of the file.
+    Negative radiance and NaN become 0, infinity becomes the largest finite value of the file, and so does a colour outside
+    Rec. 709 lose its negative part.
 
     Returns:
         The light, and how many pixels were mended.
     Raises: InputError naming file, finding and expectation.
     """
-    pixels = _read_rgb(path)
+    pixels, to_rec709 = _read(path)
     height, width, _ = pixels.shape
     if width != 2 * height or height < 2:
         raise InputError(
@@ -54,6 +58,10 @@ def load_environment(path: Path) -> tuple[Environment, int]:
         raise InputError(f"{path}: most pixels are negative, expected linear radiance; export it again without offset")
     largest = pixels[finite].max(initial=0.0)
     mended = np.nan_to_num(pixels, nan=0.0, posinf=largest, neginf=0.0).clip(0.0, None)
+    if to_rec709 is not None:
+        mended = (mended @ to_rec709.T).astype(np.float32)
+        bad |= (mended < -OUTSIDE * mended.max(-1, keepdims=True)).any(-1)
+        mended = mended.clip(0.0, None)
     if not mended.any():
         raise InputError(f"{path}: black everywhere, so no light falls on the object; choose another environment")
     return Environment(path.stem, np.ascontiguousarray(mended, np.float32)), int(bad.sum())
@@ -64,20 +72,19 @@ def save_environment(path: Path, environment: Environment) -> None:
     write_exr(path, {c: environment.radiance[..., i] for i, c in enumerate("RGB")})
 
 
-def _read_rgb(path: Path) -> NDArray[np.float32]:
+def _read(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:
+    """Pixels (H, W, 3) as stored, and the matrix to linear Rec. 709 or None. Raises: InputError."""
+    from stages.light.exr_light import read_exr_light  # compiled functions keep this module's names, and OpenImageIO minds
+
     if not path.is_file():
         raise InputError(f"{path}: no such file; expected a .hdr or .exr environment")
-    if path.suffix.lower() == ".exr":
-        channels = read_exr(path, InputError).channels
-        by_name = {name.split(".")[-1].upper(): name for name in channels}
-        if not all(c in by_name for c in "RGB"):
-            raise InputError(f"{path}: channels {', '.join(sorted(channels))}, expected R, G and B")
-        return np.stack([channels[by_name[c]].astype(np.float32) for c in "RGB"], -1)
-    if path.suffix.lower() == ".hdr":
-        pixels = read_image(path)
-        if pixels.shape[-1] < 3:
-            raise InputError(f"{path}: {pixels.shape[-1]} channels, expected 3")
-        return pixels[..., :3]
+    try:
+        if path.suffix.lower() == ".exr":
+            return read_exr_light(path)
+        if path.suffix.lower() in (".hdr", ".pic"):
+            return read_radiance(path)
+    except OSError as error:
+        raise InputError(f"{path}: {reason(error)}") from error
     raise InputError(f"{path}: a '{path.suffix}' file, expected .hdr or .exr")
 
 

@@ -15,7 +15,7 @@ class GBuffer:
     """Surface points of a view. P is the count of object pixels, row by row.
 
     mask: (H, W) bool. depth: (H, W) planar, 0 off the object. origin: (P, 3) where rays leave the point.
-    point, n, ng, wo: (P, 3) world; n and ng face the viewer, wo is unit and points to it.
+    point, n, ng, wo: (P, 3) world; n (as normal maps turn it) and ng face the viewer, wo is unit and points to it.
     triangle: (P,). barycentric: (P, 3).
     """
 

@@ -5,7 +5,6 @@ in a pyramid, which any ray may look up at the solid angle it stands for; and th
 (suns, lamps, bright windows), which is drawn in proportion to its energy, cell by cell.
 """
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.color import luminance
+from stages.core.parallel import cores
 from stages.light.environment import Environment, directions_of_texels
 from stages.light.lamps import Lamps, cluster
 from stages.light.octahedral import octahedral, texel_directions
@@ -120,7 +120,7 @@ def light_set(environments: list[Environment]) -> LightSet:
         residual, excess = split(environment.radiance)
         return octahedral(residual, SQUARE, OVERSAMPLE), octahedral(excess, FINE, OVERSAMPLE_EXCESS)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         squares, peaks = zip(*pool.map(prepare, environments), strict=True)
     pyramid, start = _pyramid(np.concatenate(squares, -1))
     for square, peak in zip(squares, peaks, strict=True):

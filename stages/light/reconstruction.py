@@ -9,7 +9,6 @@ Source: Rousselle, Knaus & Zwicker 2012, "Adaptive Rendering with Non-Local Mean
 variance).
 """
 
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.core.parallel import cores
 from stages.light.gbuffer import GBuffer
 
 RADIUS = 2
@@ -159,7 +159,7 @@ def _rows(values: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def in_parts(work: Callable[[int, int], None], count: int, size: int) -> None:
     """Do `work(start, end)` for stretches of `size` that cover 0 to `count`, on all cores."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         list(pool.map(lambda start: work(start, min(start + size, count)), range(0, count, size)))
 
 

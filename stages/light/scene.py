@@ -4,6 +4,7 @@ A miss is a mask, never a distance. Rays are float32; the mesh is the normalised
 in world units serves every source scale.
 """
 
+from copy import copy
 from dataclasses import dataclass
 from threading import Lock
 from typing import Any
@@ -12,6 +13,8 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
+
+from stages.light.normal_maps import NormalMaps
 
 OFFSET = 2e-5
 """Distance by which a secondary ray's origin is lifted off the surface, in world units (object size 1)."""
@@ -61,9 +64,13 @@ class Scene:
 
     Args:
         vertices: (V, 3) float32 world. triangles: (F, 3) int32. normals: (F, 3, 3) float32 unit, per corner.
+        bumps: normal maps that shading normals follow, if any.
     """
 
-    def __init__(self, vertices: NDArray, triangles: NDArray, normals: NDArray) -> None:
+    def __init__(
+        self, vertices: NDArray, triangles: NDArray, normals: NDArray, bumps: NormalMaps | None = None
+    ) -> None:
+        self.bumps = bumps
         self.vertices = np.ascontiguousarray(vertices, np.float32)
         self.triangles = np.ascontiguousarray(triangles, np.int32)
         self.normals = np.ascontiguousarray(normals, np.float32)
@@ -108,7 +115,18 @@ class Scene:
         corners = self.vertices[self.triangles[triangle]].astype(np.float64)  # (P, 3, 3)
         return np.einsum("pk,pkd->pd", barycentric, corners).astype(np.float32)
 
+    def bumped(self, bumps: NormalMaps | None) -> "Scene":
+        """The same mesh, and the same trees, with other normal maps."""
+        other = copy(self)
+        other.bumps = bumps
+        return other
+
     def shading_normal(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
+        """Unit interpolated normal, leaning as the normal maps say. Args: (P,), (P, 3). Returns: (P, 3)."""
+        n = self.smooth_normal(triangle, barycentric)
+        return n if self.bumps is None else self.bumps.leaning(n, triangle, barycentric)
+
+    def smooth_normal(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
         """Unit interpolated normal; the triangle's own where the corners' cancel out. Returns: (P, 3)."""
         n = np.einsum("pk,pkd->pd", barycentric, self.normals[triangle].astype(np.float64))
         length = np.linalg.norm(n, axis=-1, keepdims=True)

@@ -3,6 +3,7 @@
 Normal maps, emission, occlusion and vertex colours are ignored.
 """
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from trimesh.visual.material import PBRMaterial
 
 from stages.core.artifact import reason
+from stages.core.beside import beside
 from stages.core.color import srgb_decode
 from stages.core.errors import InputError, one_line
 from stages.core.frames import transform_points
@@ -122,9 +124,12 @@ def _meshes(path: Path) -> list[trimesh.Trimesh]:
         raise InputError(f"{path}: expected a .glb or .gltf model with metallic-roughness textures")
     try:
         transformed = _EXTENSION in path.read_bytes()
+        _expect_companions(path)
         parts = trimesh.load_scene(path).dump()
     except OSError as error:
         raise InputError(f"{path}: {reason(error)}") from error
+    except InputError:
+        raise
     except Exception as error:  # the loader raises whatever a malformed file makes it trip over
         raise InputError(f"{path}: not a readable glTF model ({one_line(error)})") from error
     if transformed:
@@ -133,6 +138,15 @@ def _meshes(path: Path) -> list[trimesh.Trimesh]:
     if not meshes:
         raise InputError(f"{path}: holds no triangles; expected a textured model")
     return meshes
+
+
+def _expect_companions(path: Path) -> None:
+    """Whether the files that a .gltf names may be read; the loader opens any. Raises: InputError; ValueError."""
+    if path.suffix.lower() == ".gltf":
+        root = json.loads(path.read_bytes())
+        for entry in [*root.get("buffers", []), *root.get("images", [])]:
+            if not entry.get("uri", "data:").startswith("data:"):
+                beside(path, entry["uri"])
 
 
 def _uv(mesh: trimesh.Trimesh) -> NDArray[np.float64]:

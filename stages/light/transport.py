@@ -27,7 +27,6 @@ Source: Veach 1997, ch. 9 (MIS); Křivánek & Colbert 2008, "Real-time Shading w
 Heidrich 2001, "Interleaved Sampling".
 """
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -39,6 +38,7 @@ from numpy.typing import NDArray
 from stages.core.albedo import MIN_COSINE
 from stages.core.brdf import alpha_from_roughness
 from stages.core.frames import tangent_frame
+from stages.core.parallel import cores
 from stages.core.shading import KNOTS, Transport
 from stages.light import highlights, reconstruction
 from stages.light.environment import Environment
@@ -224,7 +224,7 @@ def trace(
     mean, gap = np.empty((2, len(points.n), terms.stored, CHANNELS), np.float32)
     rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with ThreadPoolExecutor(cores()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
         list(pool.map(lambda part: _tile(scene, points, lights, terms, rays, pixel[part], part, wanted, mean, gap), parts))
     if not wanted.all():

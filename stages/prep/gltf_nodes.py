@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.errors import InputError
-from stages.prep.gltf_file import Gltf, accessor
+from stages.prep.gltf_data import accessor
+from stages.prep.gltf_file import Gltf
 from stages.prep.source import check_range
 
 _INSTANCING = "EXT_mesh_gpu_instancing"

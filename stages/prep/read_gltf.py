@@ -1,4 +1,5 @@
-"""glTF 2.0, as .glb and as .gltf with data URIs or files beside it: the geometry of the default scene, bit for bit.
+"""glTF 2.0, as .glb and as .gltf with data URIs or files beside it: the geometry of the default scene, bit for bit, and
+the textures of its materials that are not made anew.
 
 Own reader, because general ones flip v and re-index vertices. Source: glTF 2.0 specification, sections 3.5 to 3.7. A
 part is one primitive of one mesh on one node, or on one instance of it; vertices keep the order of their accessors, v = 0
@@ -14,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.errors import InputError
-from stages.prep.gltf_file import DRACO, Gltf, accessor, open_gltf, unpacked
+from stages.prep.gltf_data import accessor, unpacked
+from stages.prep.gltf_file import DRACO, Gltf, open_gltf
 from stages.prep.gltf_nodes import Nodes, morphed, skinned
+from stages.prep.gltf_textures import material_name, pass_on
 from stages.prep.source import IDENTITY, Part, Source, check_range, polygons
 
 _POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
@@ -23,13 +26,14 @@ _POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
 
 @dataclass(frozen=True)
 class _Block:
-    """Vertices that primitives share: the first rows of their positions, normals (-1: none) and UV sets, and the count.
+    """Vertices that primitives share: the first rows of positions, normals, tangents (-1: none), UV sets; the count.
 
     triangles: (T, 3) vertices, where they are packed together with them.
     """
 
     position: int
     normal: int
+    tangent: int
     uv: list[int]
     count: int
     triangles: NDArray[np.int64] | None
@@ -63,6 +67,7 @@ class _Geometry:
     positions: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 3))]))
     uv: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 2))]))  # of all sets
     normals: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 3), np.float32)]))
+    tangents: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 4), np.float32)]))
     corners: list[tuple[NDArray, _Block]] = field(default_factory=list)  # vertices within the block
     parts: list[Part] = field(default_factory=list)
     skipped: dict[str, int] = field(default_factory=dict)
@@ -75,6 +80,7 @@ def read_gltf(path: Path) -> Source:
     gltf = open_gltf(path)
     try:
         geometry = _gather(gltf)
+        passed_on, images = pass_on(gltf, lambda what: _count(geometry.skipped, what))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise InputError(f"{path}: not valid glTF 2.0 ({type(error).__name__}: {error}); export it again") from None
     vertex, positions = _loops(geometry, lambda block: block.position), geometry.positions.joined()
@@ -87,6 +93,8 @@ def read_gltf(path: Path) -> Source:
         "glb", positions, uv, geometry.normals.joined(), start, loop_vertex,
         first, _loops(geometry, lambda block: block.normal), face_part.astype(np.int32), geometry.parts, v_down=True,
         skipped=geometry.skipped, applied=geometry.applied, more_uv=[(uv, rows) for rows in more],
+        tangents=geometry.tangents.joined(), loop_tangent=_loops(geometry, lambda block: block.tangent),
+        passed_on=passed_on, images=images,
     )  # fmt: skip
 
 
@@ -149,7 +157,8 @@ def _add_mesh(
             _count(geometry.applied, "morph_targets_with_their_default_weights", len(primitive["targets"]))
         material = ""
         if "material" in primitive:
-            material = gltf.item("materials", primitive["material"]).get("name") or f"material_{primitive['material']}"
+            gltf.item("materials", primitive["material"])
+            material = material_name(gltf.root["materials"], primitive["material"])
         posed = joints if "JOINTS_0" in primitive["attributes"] else None
         block = _block(gltf, geometry, key, primitive, weights, posed)
         triangles = _triangles(gltf, primitive, mode, block.count) if block.triangles is None else block.triangles
@@ -172,11 +181,14 @@ def _block(
         attributes = morphed(gltf, attributes, primitive.get("targets", []), weights)
         if joints is not None:
             attributes = skinned(gltf, attributes, joints)
+        if joints is not None or any(weights):
+            attributes.pop("TANGENT", None)  # those of another pose
         count = len(attributes["POSITION"])
         sets = sorted(name for name in attributes if name.startswith("TEXCOORD_"))
         geometry.blocks[key] = _Block(
             geometry.positions.add(attributes["POSITION"], (count, 3), "POSITION", gltf.path),
             geometry.normals.add(attributes.get("NORMAL"), (count, 3), "NORMAL", gltf.path),
+            geometry.tangents.add(attributes.get("TANGENT"), (count, 4), "TANGENT", gltf.path),
             [geometry.uv.add(attributes[name], (count, 2), name, gltf.path) for name in sets],
             count,
             draco[1] if draco else None,
@@ -185,7 +197,7 @@ def _block(
 
 
 def _is_needed(attribute: str) -> bool:
-    return attribute in ("POSITION", "NORMAL") or attribute.startswith(("TEXCOORD_", "JOINTS_", "WEIGHTS_"))
+    return attribute in ("POSITION", "NORMAL", "TANGENT") or attribute.startswith(("TEXCOORD_", "JOINTS_", "WEIGHTS_"))
 
 
 def _triangles(gltf: Gltf, primitive: dict, mode: int, count: int) -> NDArray[np.int64]:

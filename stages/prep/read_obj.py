@@ -44,9 +44,10 @@ def read_obj(path: Path) -> Source:
     with np.errstate(over="ignore"):
         normals_single = normals.astype(np.float32)
     face_part, parts = _parts(content, path.stem)
+    face_group, groups = _groups(content)
     return Source(
         "obj", vertices, uv, normals_single, start, loop_vertex, indices[1], indices[2], face_part, parts,
-        skipped=content.skipped,
+        skipped=content.skipped, face_group=face_group, groups=groups,
     )  # fmt: skip
 
 
@@ -148,11 +149,19 @@ def _indices(content: _Content, sizes: tuple[int, int, int], path: Path) -> list
 
 
 def _parts(content: _Content, stem: str) -> tuple[NDArray[np.int32], list[Part]]:
-    """Parts by object and material; groups tell parts apart only in a file without objects."""
+    """Parts by object and material; groups tell parts apart only in a file without objects, where parts have no node."""
     keys = list(content.parts)
     by_object = any(name for name, _, _ in keys)
     nodes = [(name if by_object else group, material) for name, group, material in keys]
     unique = {node: row for row, node in enumerate(dict.fromkeys(nodes))}
     to_unique = np.array([unique[node] for node in nodes], np.int32)
-    parts = [Part(name or stem, material, name) for name, material in unique]
+    parts = [Part(name or stem, material, name if by_object else "") for name, material in unique]
     return to_unique[np.array(content.face_part, np.int32)], parts
+
+
+def _groups(content: _Content) -> tuple[NDArray[np.int32], list[str]]:
+    """The group of each face, -1 for none, and the groups' names."""
+    of_key = [group for _, group, _ in content.parts]
+    rows = {group: row for row, group in enumerate(dict.fromkeys(filter(None, of_key)))}
+    numbers = np.array([rows.get(group, -1) for group in of_key], np.int32)
+    return numbers[np.array(content.face_part, np.int32)], list(rows)

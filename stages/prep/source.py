@@ -7,6 +7,7 @@ they cannot take literally.
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,11 @@ from stages.core.errors import InputError
 from stages.core.frames import transform_points
 
 IDENTITY = tuple(float(x) for x in np.eye(4).reshape(-1))
+
+
+def nothing_passed_on() -> dict[str, Any]:
+    """What a source without further textures has of them."""
+    return {"materials": {}, "textures": [], "images": []}
 
 
 @dataclass(frozen=True)
@@ -34,9 +40,12 @@ class Source:
     vertices: (SV, 3) float64 as in the file. uv: (ST, 2) float64. normals: (SN, 3) float32.
     loop_start: (P + 1,) int32; face p has loops loop_start[p] .. loop_start[p + 1] - 1.
     loop_vertex, loop_uv, loop_normal: (L,) int32 rows of the above; -1 where a loop has no UV or normal.
-    face_part: (P,) int32 rows of parts. v_down: whether v = 0 is the top of the image.
-    skipped: what the file holds besides triangles and polygons, with its count. applied: what made these vertices out of
-    the file's (skins, morph targets, instances). more_uv: further UV sets, uv and loop_uv of each.
+    face_part: (P,) int32 rows of parts. face_group: (P,) int32 rows of groups (an OBJ's `g`), or -1.
+    v_down: whether v = 0 is the top of the image. tangents: (SG, 4) float32; loop_tangent: (L,) rows of these.
+    passed_on, images: what materials have besides colour, see `stages.asset.passed_on`.
+    skipped: what the file holds besides triangles and polygons, with its count.
+    applied: what made these vertices out of the file's (skins, morph targets, instances). more_uv: further UV sets, uv and
+    loop_uv of each.
     """
 
     format: str
@@ -53,10 +62,18 @@ class Source:
     skipped: dict[str, int] = field(default_factory=dict)
     applied: dict[str, int] = field(default_factory=dict)
     more_uv: list[tuple[NDArray[np.float64], NDArray[np.int32]]] = field(default_factory=list)
+    face_group: NDArray[np.int32] | None = None
+    groups: list[str] = field(default_factory=list)
+    tangents: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 4), np.float32))
+    loop_tangent: NDArray[np.int32] | None = None
+    passed_on: dict[str, Any] = field(default_factory=nothing_passed_on)
+    images: list[bytes] = field(default_factory=list)
 
     def by_uv_set(self) -> list["Source"]:
-        """This source, and itself with each further UV set in the first one's place."""
-        return [self, *(replace(self, uv=uv, loop_uv=loop_uv) for uv, loop_uv in self.more_uv)]
+        """This source, and itself with each further UV set in the first one's place; tangents and the textures passed on
+        belong to the first."""
+        bare = replace(self, tangents=self.tangents[:0], loop_tangent=None, passed_on=nothing_passed_on(), images=[])
+        return [self, *(replace(bare, uv=uv, loop_uv=loop_uv) for uv, loop_uv in self.more_uv)]
 
     def placed_vertices(self) -> NDArray[np.float64]:
         """(SV, 3) vertices with node transforms applied; an unreferenced vertex stays as it is."""

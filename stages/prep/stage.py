@@ -25,7 +25,7 @@ from stages.prep.read_ply import read_ply
 from stages.prep.read_stl import read_stl
 from stages.prep.read_usd import layers, read_usd
 from stages.prep.repair import Working, repair
-from stages.prep.source import Source
+from stages.prep.source import Source, nothing_passed_on
 from stages.prep.topology import components, edges
 from stages.prep.unwrap import unwrap
 from stages.prep.uv import loop_uvs, signed_area, unusable, uv_charts
@@ -80,9 +80,11 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
             "source_name": mesh.name,
             "uv_kept": kept,
             "parts": [asdict(part) for part in source.parts],
+            "groups": source.groups,
+            "passed_on": source.passed_on if kept else nothing_passed_on(),
             "findings": findings,
         }
-        arrays = _arrays(source, working, normals, uv, chart, loop_uv)
+        arrays = _arrays(source, working, normals, uv, chart, loop_uv) | _extras(source, kept)
         save_npz(out, PREP, arrays, Provenance(request.options, None, request.inputs, extra))
         progress("write", 4, 4)
     return PrepResult(False, findings)
@@ -188,6 +190,17 @@ def _texel_density(working: Working, uv: NDArray, texture_size: int) -> float:
     """Texels per unit of length in the world frame, from the areas of all faces together."""
     _, area = face_normals(working.vertices, working.triangles)
     return round(texture_size * float(np.sqrt(np.abs(signed_area(uv)).sum() / area.sum())), 3)
+
+
+def _extras(source: Source, kept: bool) -> dict[str, NDArray]:
+    """Arrays that only some formats fill. Args: kept: whether the UVs were."""
+    none = np.full(len(source.loop_vertex), -1, np.int32)
+    return {
+        "face_group": none[: len(source.face_part)] if source.face_group is None else source.face_group,
+        "source_tangents": source.tangents,
+        "loop_source_tangent": none if source.loop_tangent is None else source.loop_tangent,
+        "source_images": np.frombuffer(b"".join(source.images if kept else []), np.uint8),
+    }
 
 
 def _arrays(

@@ -19,6 +19,9 @@ from stages.prior.text import WEIGHTS_FOLDER, Reader, Reading, TextEmbedding, Te
 WEIGHTS = Schema("dreammat.prior", 1, {"parameters": Field("f2", ("N",))}, extra=("layout", "training"))
 """All parameters in one row, in the order of `layout`: [name, shape] each. training: what they came from."""
 
+PRECISION = torch.bfloat16
+"""Of the denoiser's products."""
+
 WEIGHTS_FILE = WEIGHTS_FOLDER / "prior.npz"
 VOCABULARY_FILE = WEIGHTS_FOLDER / "vocabulary.npz"
 
@@ -104,7 +107,7 @@ class Prior:
         """
         given = self.no_conditions(len(x_t)) if conditions is None else conditions
         a = diffusion.per_image(self.alpha_bar, t)
-        with torch.no_grad(), torch.autocast(self.device.type, torch.bfloat16):
+        with torch.no_grad(), torch.autocast(self.device.type, PRECISION):
             v, material = self.network.denoiser(x_t, t, a, given, text)
         return diffusion.noise_from_velocity(self.alpha_bar, x_t, v, t), material
 
@@ -140,6 +143,10 @@ def load_prior(device: str | torch.device = "cpu", weights: Path | None = None) 
         raise ArtifactError(f"{path}: weights of another network; train again or install the version they belong to")
     network.set_flat(stored["parameters"])
     network.eval().requires_grad_(False).to(device)
+    network.denoiser.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # as convolutions want it
+    for layer in network.denoiser.modules():  # what autocast would do to them in every step
+        if isinstance(layer, nn.Conv2d | nn.Linear):
+            layer.to(PRECISION)
     identity = {
         "name": "dreammat-prior",
         "weights": sha256_file(path),

@@ -20,6 +20,7 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from stages.asset.traced import traced_scene
 from stages.conditions.cameras import place_cameras
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import read_lights
@@ -125,7 +126,7 @@ def report_conditions(prep: Path, out: Path, options: ReportOptions, progress: P
 
 def make_subject(mesh: Artifact, lights: list[Environment], options: ReportOptions) -> Subject:
     """The view and its converged result."""
-    scene = Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+    scene = traced_scene(mesh)
     camera = place_cameras(mesh["vertices"].astype(np.float64), ConditionsOptions(views=1, seed=options.seed))
     c2w, fov_y = camera.c2w[0], covering(scene, camera.c2w[0], float(camera.fov_y[0]))
     points = trace_view(scene, c2w, fov_y, options.size, options.size)

@@ -28,7 +28,7 @@ from stages.core.shading import KNOTS, Material, Transport, shade_reference
 from stages.distill.guidance.sd import BUDGET, StableDiffusionGuidance, view_size
 from stages.distill.options import DistillOptions
 from stages.distill.sampling import CropSampler
-from stages.distill.stage import Clock, Run, chosen_device, new_state, optimisation_step
+from stages.distill.stage import Clock, Run, chosen_device, draw, new_state, optimisation_step
 from stages.distill.views import Views
 from stages.report.counters import Cost, Stopwatch, count, peak_bandwidth, peak_flops
 from stages.report.options import DistillReportOptions
@@ -99,12 +99,12 @@ def report_distill(conditions: Path, out: Path, options: DistillReportOptions, p
     for i in range(options.warm_up + options.steps):
         progress("measured steps", i, options.warm_up + 2 * options.steps)
         run.clock, timed.seconds = Waiting(device), {}
-        run.state.loss.append(optimisation_step(run))
+        run.state.loss.append(optimisation_step(run, *draw(run, run.state.step)))
         steps.append(run.clock.per_step(1) | {name: 1000 * s for name, s in timed.seconds.items()})
     run.clock, whole = Clock(), Stopwatch(device)
     for i in range(options.steps):
         progress("whole steps", options.warm_up + options.steps + i, options.warm_up + 2 * options.steps)
-        run.state.loss.append(optimisation_step(run))
+        run.state.loss.append(optimisation_step(run, *draw(run, run.state.step)))
     step = 1000 * whole.seconds() / options.steps
     middle = {name: float(np.median([s[name] for s in steps[options.warm_up :]])) for name in steps[0]}
     pixels = sum(len(views.pixels(view)) for view in views.seen) // len(views.seen) * options.batch

@@ -8,11 +8,12 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from stages.bake.source import fan_triangles
 from stages.core.artifact import Provenance, save_npz, sha256_file
 from stages.core.field import FieldConfig, MaterialField
 from stages.core.frames import Y_UP_TO_WORLD, look_at, transform_points
+from stages.core.polygons import triangulate
 from stages.core.schemas import MATERIAL, PREP
+from stages.prep.source import nothing_passed_on
 
 IDENTITY = np.eye(4).reshape(-1).tolist()
 
@@ -31,6 +32,8 @@ class Example:
     uv_kept: bool = False
     to_world: NDArray = field(default_factory=lambda: Y_UP_TO_WORLD)
     loop_normal: NDArray | None = None
+    group: list[int] | None = None
+    groups: tuple[str, ...] = ()
 
     def with_(self, **changes: Any) -> "Example":
         return replace(self, **changes)
@@ -66,8 +69,10 @@ def prep_arrays(example: Example) -> dict[str, NDArray]:
     size = np.array([len(face) for face in example.faces])
     loop_start = np.concatenate([[0], np.cumsum(size)]).astype("i4")
     loop_vertex = np.concatenate(example.faces).astype("i4")
-    fan, face = fan_triangles(loop_start)
+    fan, face = triangulate(loop_start, example.vertices[loop_vertex])
     transforms = np.stack([np.reshape(part["transform"], (4, 4)) for part in example.parts])
+    mirrored = np.linalg.det(transforms[:, :3, :3]) < 0
+    fan = np.where(mirrored[np.array(example.part)[face], None], fan[:, [0, 2, 1]], fan)  # as a renderer sees them
     world = np.zeros_like(example.vertices, np.float64)
     for loop, part in zip(range(len(loop_vertex)), np.repeat(example.part, size), strict=True):
         vertex = loop_vertex[loop]
@@ -96,7 +101,11 @@ def prep_arrays(example: Example) -> dict[str, NDArray]:
         "loop_source_uv": loops if example.uv_kept else np.full(len(loops), -1, "i4"),
         "loop_source_normal": loops if has_normal else np.full(len(loops), -1, "i4"),
         "face_part": np.array(example.part, "i4"),
+        "face_group": np.array(example.group or [-1] * len(example.faces), "i4"),
         "loop_uv": uv,
+        "source_tangents": np.zeros((0, 4), "f4"),
+        "loop_source_tangent": np.full(len(loops), -1, "i4"),
+        "source_images": np.zeros(0, "u1"),
     }
 
 
@@ -107,6 +116,8 @@ def save_prep(path: Path, example: Example) -> Path:
         "source_name": f"thing.{example.source_format}",
         "uv_kept": example.uv_kept,
         "parts": example.parts,
+        "groups": list(example.groups),
+        "passed_on": nothing_passed_on(),
         "findings": {"vertices": len(example.vertices)},
     }
     save_npz(path, PREP, prep_arrays(example), Provenance({}, None, {"mesh": "0" * 64}, extra))

@@ -1,21 +1,26 @@
 """The stage as a whole: its files, their contents, and what it says when it cannot."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from stages.asset.maps import Maps
+from stages.asset.textures import normal_8bit, srgb_8bit
 from stages.bake import stage
 from stages.bake.options import BakeOptions
 from stages.bake.preview import bilinear
 from stages.bake.stage import bake
-from stages.bake.textures import srgb_8bit
 from stages.core.artifact import read_exr, read_manifest, sha256_file
 from stages.core.color import srgb_encode
 from stages.core.errors import ArtifactError, InputError, OutputError
 from stages.core.images import read_image
 from stages.core.schemas import ASSET
+from tests.asset.glb import Glb
+from tests.asset.test_models import khronos_issues
 from tests.bake.examples import (
     constant_field,
     cube,
@@ -25,7 +30,6 @@ from tests.bake.examples import (
     save_prep,
     small_field,
 )
-from tests.bake.glb import Glb
 from tests.conftest import Golden
 
 SMALL = BakeOptions(size=512, supersample=1, preview_size=32)
@@ -91,6 +95,71 @@ def test_the_model_holds_the_very_pictures(constant_asset: Path) -> None:
     }
 
 
+@pytest.mark.usefixtures("no_preview")
+def test_relief_and_occlusion_are_written_where_a_material_has_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prep = save_prep(tmp_path / "prep.npz", cube().with_(source_format="obj"))
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    flat_maps = stage.bake_maps
+    height = np.random.default_rng(0).random((512, 512), np.float32) * np.float32(1e-3)
+
+    def with_more(*args: Any) -> tuple[Maps, dict[str, Any]]:
+        maps, coverage = flat_maps(*args)
+        return replace(maps, height=height, occlusion=np.full((512, 512), 0.25, np.float32)), coverage
+
+    monkeypatch.setattr(stage, "bake_maps", with_more)
+    out = tmp_path / "asset"
+    files = set(bake(prep, material, out, SMALL).files)
+    assert {"height.exr", "normal.exr", "normal.png", "occlusion.exr"} <= files
+    np.testing.assert_array_equal(read_exr(out / "height.exr").channels["Y"], height)
+    normal = np.stack([read_exr(out / "normal.exr").channels[c] for c in "RGB"], -1).astype(float)
+    assert (np.abs(np.linalg.norm(normal, axis=-1) - 1) < 1e-3).all()
+    assert np.degrees(np.arccos(normal[..., 2].clip(-1, 1))).mean() > 2
+    np.testing.assert_allclose(read_image(out / "normal.png") * 2 - 1, normal, atol=1 / 127)
+    np.testing.assert_allclose(read_image(out / "orm.png")[..., 0], 0.25, atol=0.5 / 255)
+    assert "norm normal.png" in (out / "model.mtl").read_text()
+    glb = Glb.read(out / "model.glb")
+    assert [image["name"] for image in glb.root["images"]] == ["albedo", "orm", "normal"]
+    assert glb.root["materials"][0]["normalTexture"] == {"index": 2}
+    assert glb.root["materials"][0]["occlusionTexture"] == {"index": 1}
+    (primitive,) = glb.primitives()
+    assert len(glb.attribute(primitive, "TANGENT")) == len(glb.attribute(primitive, "POSITION")) == 24
+    issues = khronos_issues(out / "model.glb")
+    assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"]
+
+
+def test_relief_shows_in_the_preview(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The picture is shaded with the baked normal map: grooves change it on the object and nowhere else."""
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    bake(prep, material, tmp_path / "flat", SMALL)
+    flat_maps = stage.bake_maps
+    grooves = np.broadcast_to(2e-3 * np.sin(np.arange(512, dtype=np.float32) / 3), (512, 512))
+
+    def grooved(*args: Any) -> tuple[Maps, dict[str, Any]]:
+        maps, coverage = flat_maps(*args)
+        return replace(maps, height=np.ascontiguousarray(grooves)), coverage
+
+    monkeypatch.setattr(stage, "bake_maps", grooved)
+    bake(prep, material, tmp_path / "grooved", SMALL)
+    views = [read_image(tmp_path / name / "preview.png")[:64] for name in ("flat", "grooved")]
+    differs = np.abs(views[0] - views[1]).max(-1) > 0.02
+    assert 0.1 < differs.mean() < 0.7
+    assert not differs[:, :2].any()  # the background
+
+
+def test_normals_become_bytes_without_terraces() -> None:
+    """A slope of less than a step a hundred texels long: dithered, its mean is right everywhere; flat stays flat."""
+    angle = np.linspace(0.001, 0.02, 4096, dtype="f4")
+    normal = np.stack([np.sin(angle), 0 * angle, np.cos(angle)], -1)[None].repeat(64, 0)
+    error = (normal_8bit(normal).astype(float) / 127.5 - 1 - normal).mean(0).reshape(64, 64, 3).mean(1)
+    assert np.abs(error).max() < 3e-4  # a step is 7.8e-3; without dithering the error reaches half of it
+    flat = np.zeros((2, 2, 3), "f4")
+    flat[..., 2] = 1
+    np.testing.assert_array_equal(normal_8bit(flat), np.broadcast_to([128, 128, 255], (2, 2, 3)))
+
+
 def test_the_same_request_is_up_to_date_and_force_gives_the_same_bytes(constant_asset: Path, tmp_path: Path) -> None:
     prep, material, folder = (constant_asset / name for name in ("prep.npz", "material.npz", "asset"))
     assert bake(prep, material, folder, SMALL).up_to_date
@@ -109,6 +178,25 @@ def test_another_request_replaces_the_folder_and_takes_its_old_files_away(tmp_pa
         (out / "mine.txt").write_text("not ours")
     assert not (out / "model.obj").exists()
     assert (out / "mine.txt").exists()
+
+
+@pytest.mark.usefixtures("no_preview")
+def test_an_asset_of_an_older_version_is_replaced_and_a_foreign_folder_is_not(tmp_path: Path) -> None:
+    prep = save_prep(tmp_path / "prep.npz", cube())
+    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    out = tmp_path / "asset"
+    out.mkdir()
+    (out / "normal.png").write_text("of an older asset")
+    (out / "bake.json").write_text('{"schema": "dreammat.asset", "version": 1, "files": {"normal.png": "0"}}')
+    with pytest.raises(ArtifactError, match=r"bake\.json: dreammat\.asset version 1, expected 2; make it again"):
+        read_manifest(out, ASSET)
+    bake(prep, material, out, SMALL)
+    assert not (out / "normal.png").exists()
+    read_manifest(out, ASSET)
+    (out / "bake.json").write_text('{"oven": 200}')
+    with pytest.raises(OutputError, match=r"bake\.json: not a file of dreammat's; give another folder"):
+        bake(prep, material, out, SMALL)
+    assert (out / "bake.json").read_text() == '{"oven": 200}' and (out / "model.glb").exists()
 
 
 @pytest.mark.usefixtures("no_preview")

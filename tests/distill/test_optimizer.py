@@ -69,6 +69,17 @@ def test_dense_gradient_of_a_table_updates_the_rows_that_have_one() -> None:
     assert torch.equal(tables[0], tables[1])
 
 
+def test_rows_that_come_twice_or_out_of_order_are_summed_first() -> None:
+    table = nn.Parameter(torch.zeros(6, 2))
+    optimizer = RowAdam({"table": table}, frozenset({"table"}))
+    rows, values = torch.tensor([[4, 1, 4]]), torch.tensor([[1.0, 2.0], [5.0, 6.0], [-3.0, 4.0]])
+    table.grad = torch.sparse_coo_tensor(rows, values, table.shape, check_invariants=True)
+    optimizer.step(0.01)
+    state = optimizer.to_arrays()
+    np.testing.assert_array_equal(state["count.table"], [0, 1, 0, 0, 1, 0])
+    np.testing.assert_allclose(state["m.table"][[1, 4]], (1 - BETAS[0]) * np.array([[5, 6], [-2, 6]]), rtol=1e-6)
+
+
 def test_state_comes_back() -> None:
     def run(optimizer: RowAdam, parameter: nn.Parameter, steps: range) -> None:
         for step in steps:

@@ -68,7 +68,7 @@ def guidance(views: Views, colour: float, batch: int = 2, **options: Any) -> Pri
 
 def shown(made: PriorGuidance, seed: int = 0) -> tuple[Any, Tensor, torch.Generator]:
     generator = torch.Generator().manual_seed(seed)
-    sample = made.sampler.draw(generator)
+    sample = made.draw(generator)
     count = len(sample.points)
     grey = Material(torch.full((count, 3), 0.3), torch.full((count,), 0.5), torch.zeros(count))
     return sample, shade(sample.transport, grey), generator

@@ -2,21 +2,25 @@
 
 import os
 import signal
+import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
+from stages.core import parallel
 from stages.core.artifact import load_npz, peek
 from stages.core.errors import ArtifactError, InputError, NumericalError
 from stages.core.field import MaterialField
 from stages.core.schemas import MATERIAL
-from stages.distill import checkpoint, stage
+from stages.distill import checkpoint, stage, start
 from stages.distill.guidance import reference
 from stages.distill.guidance.base import Budget, Response
 from stages.distill.options import DistillOptions
+from stages.distill.sampling import CropSampler, PixelSampler
 from stages.distill.stage import distill
 from stages.distill.views import Views
 from stages.light.textured_model import TexturedModel
@@ -219,3 +223,30 @@ def test_per_step_cost_is_in_the_run_log(folder: Path, tmp_path: Path) -> None:
     distill(folder / "conditions", out, options(folder, steps=2))
     log = (tmp_path / "material.npz.run.json").read_text()
     assert all(part in log for part in ("data", "field", "shading", "guidance", "backward", "optimiser"))
+
+
+@pytest.mark.parametrize("guidance", ["prior", "reference"])
+def test_bytes_do_not_depend_on_the_number_of_threads(
+    guidance: str, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor does torch ever work on more than one, on whatever thread of ours it is called: its own spin while they wait."""
+    seen, by_torch = set(), torch.get_num_threads()
+    drawn = CropSampler.draw if guidance == "prior" else PixelSampler.draw
+
+    def draw(self: Any, generator: torch.Generator) -> Any:
+        seen.add((threading.current_thread() is threading.main_thread(), torch.get_num_threads()))
+        return drawn(self, generator)
+
+    monkeypatch.setattr(CropSampler if guidance == "prior" else PixelSampler, "draw", draw)
+    monkeypatch.setattr(start, "STEPS", 4)
+    written = []
+    for threads in (1, 2, 3):
+        monkeypatch.setattr(parallel, "cores", lambda threads=threads: threads)
+        torch.set_num_threads(threads)
+        out = tmp_path / f"{threads}.npz"
+        distill(folder / "conditions", out, options(folder, guidance=guidance, prompt="oak", steps=5, smoothness=0.1))
+        assert torch.get_num_threads() == threads
+        written.append(out.read_bytes())
+    torch.set_num_threads(by_torch)
+    assert written[0] == written[1] == written[2]
+    assert seen == {(False, 1)}

@@ -93,7 +93,8 @@ def test_same_seed_same_bits_whatever_the_threads(monkeypatch: pytest.MonkeyPatc
     points = scenes.view_of(scene, 96)
     results = []
     for threads in (1, 3):
-        monkeypatch.setattr("os.cpu_count", lambda threads=threads: threads)
+        for module in ("transport", "reconstruction", "light_set"):
+            monkeypatch.setattr(f"stages.light.{module}.cores", lambda threads=threads: threads)
         results.append(stacked(light_transport(scene, points, [scenes.sunny_light()], QUALITY["draft"], 7)[0]))
     assert torch.equal(*results)
 

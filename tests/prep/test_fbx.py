@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import stages.prep.read_fbx as reader
-from stages.bake.source import source_model
+from stages.asset.model import source_model
 from stages.core.artifact import load_npz
 from stages.core.errors import InputError
 from stages.core.frames import transform_points

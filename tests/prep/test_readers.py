@@ -50,7 +50,11 @@ def test_obj_groups_are_parts_only_without_objects(tmp_path: Path) -> None:
     body = "v 0 0 0\nv 1 0 0\nv 0 1 0\n{}g a\nf 1 2 3\ng b\nf 1 2 3\ng a\nf 3 2 1\n"
     grouped = read_obj(write(tmp_path / "g.obj", body.format("")))
     assert [part.name for part in grouped.parts] == ["a", "b"] and grouped.face_part.tolist() == [0, 1, 0]
-    assert len(read_obj(write(tmp_path / "o.obj", body.format("o whole\n"))).parts) == 1
+    whole = read_obj(write(tmp_path / "o.obj", body.format("o whole\n")))
+    assert [(part.name, part.node) for part in whole.parts] == [("whole", "whole")]
+    for source in (grouped, whole):
+        assert source.groups == ["a", "b"] and source.face_group is not None
+        assert source.face_group.tolist() == [0, 1, 0]
 
 
 def test_obj_numbers_that_are_none(tmp_path: Path) -> None:

@@ -64,6 +64,9 @@ class Guidance(Protocol):
     inputs: dict[str, str]
     budget: Budget
 
+    def draw(self, generator: torch.Generator) -> Sample:
+        """What a step shows, with all that `respond` needs of it and no field changes. May be called on another thread."""
+
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """Which way the rendered pixels should go.
 

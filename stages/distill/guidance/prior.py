@@ -5,8 +5,10 @@ diffusion time; the score moves the picture. All three branches (prompt, no prom
 conditions, or colours shift. What the words alone call for comes along.
 """
 
+import dataclasses
 import functools
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import torch
@@ -31,6 +33,16 @@ itself goes past the prompt, most where most light falls: with 2.5 and 0.5, unan
 albedo."""
 
 
+@dataclass(frozen=True)
+class Given:
+    """What the model is told of a sample: exposure (B, 1, 1, 1), condition channels (B, 23, S, S), and what the words alone
+    call for at its points, as in `Response.expected`."""
+
+    exposure: Tensor
+    conditions: Tensor
+    expected: Tensor
+
+
 class PriorGuidance:
     """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size; begin: finds what the words call for."""
 
@@ -48,24 +60,30 @@ class PriorGuidance:
         """Found when first asked for: a run that is up to date never does."""
         return self._begin()
 
+    def draw(self, generator: torch.Generator) -> Sample:
+        """See `Guidance.draw`."""
+        sample, given = self.sampler.draw(generator), self._options.given
+        assert sample.images is not None
+        exposure, conditions = self._conditions(sample.images, sample)
+        if given != "full":
+            conditions = self._prior.drop(conditions, geometry=given != "geometry", light=given != "light")
+        expected = encoded(self.start(sample.points, sample.normals))
+        return dataclasses.replace(sample, given=Given(exposure, conditions, expected))
+
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """See `Guidance.respond`; the number for the curve is the root mean square of the score on the picture."""
         assert sample.images is not None
-        images, prior = sample.images, self._prior
-        exposure, conditions = self._conditions(images, sample)
-        if (given := self._options.given) != "full":
-            conditions = prior.drop(conditions, geometry=given != "geometry", light=given != "light")
+        images, prior, given = sample.images, self._prior, sample.given
         leaf = radiance.detach().requires_grad_()
-        picture = prior.profile_tone(exposure * images.paint(leaf))  # (B, 3, S, S)
+        picture = prior.profile_tone(given.exposure * images.paint(leaf))  # (B, 3, S, S)
 
         def predict(x_t: Tensor, t: Tensor, branches: int) -> Tensor:
-            return prior.denoise(x_t, t, conditions.repeat(branches, 1, 1, 1), self._text(images, branches))[0]
+            return prior.denoise(x_t, t, given.conditions.repeat(branches, 1, 1, 1), self._text(images, branches))[0]
 
         score = distillation_score(predict, picture.detach(), prior.alpha_bar, self.weights, progress, generator)
-        (gradient,) = torch.autograd.grad(picture, leaf, score / len(radiance))
+        (gradient,) = torch.autograd.grad((picture * score).sum() / len(radiance), leaf)
         on_object = images.paint(torch.ones_like(radiance[:, :1]))
-        expected = encoded(self.start(sample.points, sample.normals))
-        return Response(gradient, float((score * on_object).square().mean().sqrt()), expected=expected)
+        return Response(gradient, float((score * on_object).square().mean().sqrt()), expected=given.expected)
 
     def _conditions(self, images: Images, sample: Sample) -> tuple[Tensor, Tensor]:
         """Exposure (B, 1, 1, 1) and condition channels (B, 23, S, S)."""

@@ -62,6 +62,10 @@ class ReferenceGuidance:
         self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)
         self._floor = FLOOR * self._target.mean((0, 2))  # (L,)
 
+    def draw(self, generator: torch.Generator) -> Sample:
+        """See `Guidance.draw`."""
+        return self.sampler.draw(generator)
+
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """See `Guidance.respond`; the number for the curve is the mean absolute residual, in nepers."""
         assert sample.rows is not None

@@ -55,6 +55,10 @@ class StableDiffusionGuidance:
         prompts = [f"{options.prompt}, {words}" for words in VIEW_WORDS]
         self._text = model.embed([*prompts, "", options.negative_prompt])  # (6, T, D)
 
+    def draw(self, generator: torch.Generator) -> Sample:
+        """See `Guidance.draw`."""
+        return self.sampler.draw(generator)
+
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """See `Guidance.respond`; the number for the curve is the root mean square of the score on the latents."""
         assert sample.images is not None

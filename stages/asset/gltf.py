@@ -1,18 +1,20 @@
 """Writer of binary glTF 2.0: our own bytes, so that every position, index and UV is the very bits it was given.
 
-Source: Khronos glTF 2.0 specification, sections 3 (concepts) and 4 (GLB). Images are embedded PNG files.
+Source: Khronos glTF 2.0 specification, sections 3 (concepts) and 4 (GLB). Images are embedded.
 """
 
 import importlib.metadata
 import json
 import struct
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.source import Model, Part
+from stages.asset.model import Model, Part
+from stages.asset.passed_on import TEXTURES, PassedOn
 from stages.core.artifact import written_atomically
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
@@ -28,30 +30,87 @@ def generator() -> str:
         return "dreammat"
 
 
-def write_glb(path: Path, model: Model, images: dict[str, bytes]) -> None:
-    """Write model.glb atomically.
+@dataclass(frozen=True)
+class Look:
+    """What the materials show.
 
-    Args:
-        images: PNG files by name: "albedo" (sRGB) and "orm" (linear: G roughness, B metallic), in this order.
+    images: PNG files by name: "albedo" (sRGB), "orm" (linear: R occlusion, G roughness, B metallic) and, where there is
+    relief, "normal" (linear). occlusion: whether R of "orm" holds any. passed_on: what else the source's materials had.
     """
+
+    images: dict[str, bytes]
+    occlusion: bool = False
+    passed_on: PassedOn = field(default_factory=PassedOn)
+
+    def material(self, name: str) -> dict[str, Any]:
+        """glTF's material; the textures baked here take the rows of `images`, those passed on the rows after them."""
+        row = {image: index for index, image in enumerate(self.images)}
+        pbr = {"baseColorTexture": {"index": row["albedo"]}, "metallicRoughnessTexture": {"index": row["orm"]}}
+        made: dict[str, Any] = {"name": name or "material", "pbrMetallicRoughness": pbr}
+        for key, value in self.passed_on.materials.get(name, {}).items():
+            made[key] = value | {"index": value["index"] + len(row)} if key in TEXTURES else value
+        if "normal" in row:
+            made["normalTexture"] = {"index": row["normal"]}
+        if self.occlusion:
+            made["occlusionTexture"] = {"index": row["orm"]}
+        return made
+
+    def textures(self) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+        """glTF's textures and samplers; the first sampler is the baked textures' own."""
+        samplers: list[dict[str, Any]] = [
+            {"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": CLAMP, "wrapT": CLAMP},
+        ]
+        textures: list[dict[str, Any]] = [{"source": index, "sampler": 0} for index in range(len(self.images))]
+        for texture in self.passed_on.textures:
+            entry = {"source": len(self.images) + texture["image"]}
+            if "sampler" in texture:
+                if texture["sampler"] not in samplers:
+                    samplers.append(texture["sampler"])
+                entry["sampler"] = samplers.index(texture["sampler"])
+            textures.append(entry)
+        return textures, samplers
+
+    def stored_images(self, buffer: "_Buffer") -> list[dict[str, Any]]:
+        """glTF's images, whose bytes go into the buffer."""
+        files = [(name, "image/png", data) for name, data in self.images.items()] + self.passed_on.images
+        return [
+            ({"name": name} if name else {}) | {"mimeType": kind, "bufferView": buffer.view(data)}
+            for name, kind, data in files
+        ]
+
+
+def write_glb(path: Path, model: Model, look: Look) -> None:
+    """Write model.glb atomically."""
     buffer = _Buffer()
-    materials = list(dict.fromkeys(part.material for part in model.parts))
-    meshes, nodes, roots = _scene(model, materials, buffer)
+    names = list(dict.fromkeys(part.material for part in model.parts))
+    meshes, nodes, roots = _scene(model, names, buffer)
+    sides = {"doubleSided": True} if model.double_sided else {}
+    textures, samplers = look.textures()
     document: dict[str, Any] = {
         "asset": {"version": "2.0", "generator": generator()},
         "scene": 0,
         "scenes": [{"nodes": roots}],
         "nodes": nodes,
         "meshes": meshes,
-        "materials": [_material(name, model.double_sided) for name in materials],
-        "textures": [{"source": index, "sampler": 0} for index in range(len(images))],
-        "samplers": [{"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": CLAMP, "wrapT": CLAMP}],
-        "images": [
-            {"name": name, "mimeType": "image/png", "bufferView": buffer.view(data)} for name, data in images.items()
-        ],
+        "materials": [look.material(name) | sides for name in names],
+        "textures": textures,
+        "samplers": samplers,
+        "images": look.stored_images(buffer),
     }
+    if extensions := _extensions(document["materials"]):
+        document["extensionsUsed"] = extensions
     document |= {"accessors": buffer.accessors, "bufferViews": buffer.views, "buffers": [{"byteLength": buffer.length}]}
     _write_chunks(path, document, buffer)
+
+
+def _extensions(content: Any) -> list[str]:
+    """Names of the extensions that a piece of glTF uses, sorted."""
+    found: set[str] = set()
+    if isinstance(content, dict):
+        found |= set(content.get("extensions", {}))
+    for value in content.values() if isinstance(content, dict) else content if isinstance(content, list) else ():
+        found |= set(_extensions(value))
+    return sorted(found)
 
 
 class _Buffer:
@@ -74,7 +133,7 @@ class _Buffer:
         return len(self.views) - 1
 
     def accessor(self, array: NDArray, kind: str, target: int, bounds: bool = False) -> int:
-        """Store an array once. Args: kind: "SCALAR", "VEC2" or "VEC3". Returns: the index of its accessor."""
+        """Store an array once. Args: kind: "SCALAR", "VEC2", "VEC3" or "VEC4". Returns: the index of its accessor."""
         key = (id(array), kind, target)
         if key not in self._known:  # the array is kept, so that its id stays its own
             component = {"f4": FLOAT, "u2": UINT16, "u4": UINT32}[array.dtype.str[1:]]
@@ -145,8 +204,9 @@ def _columns(matrix: NDArray[np.float64]) -> list[float]:
 
 def _primitive(part: Part, materials: list[str], buffer: _Buffer) -> dict[str, Any]:
     attributes = {"POSITION": buffer.accessor(part.positions, "VEC3", ARRAY, bounds=True)}
-    if part.normals is not None:
-        attributes["NORMAL"] = buffer.accessor(part.normals, "VEC3", ARRAY)
+    attributes["NORMAL"] = buffer.accessor(part.normals, "VEC3", ARRAY)
+    if part.tangents is not None:
+        attributes["TANGENT"] = buffer.accessor(part.tangents, "VEC4", ARRAY)
     attributes["TEXCOORD_0"] = buffer.accessor(part.uv, "VEC2", ARRAY)
     small = len(part.positions) <= 65535  # the index 65535 itself means "restart"
     indices = part.triangles.reshape(-1).astype(np.uint16 if small else np.uint32)
@@ -155,12 +215,6 @@ def _primitive(part: Part, materials: list[str], buffer: _Buffer) -> dict[str, A
         "indices": buffer.accessor(indices, "SCALAR", ELEMENTS),
         "material": materials.index(part.material),
     }
-
-
-def _material(name: str, double_sided: bool) -> dict[str, Any]:
-    textures = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}
-    sides = {"doubleSided": True} if double_sided else {}
-    return {"name": name or "material", "pbrMetallicRoughness": textures, **sides}
 
 
 def _write_chunks(path: Path, document: dict[str, Any], buffer: _Buffer) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 TYPES = {5126: "<f4", 5123: "<u2", 5125: "<u4"}
-WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}
+WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 
 
 @dataclass(frozen=True)

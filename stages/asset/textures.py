@@ -1,0 +1,117 @@
+"""The texture files: EXR masters and 8-bit PNGs.
+
+Masters are half float, linear: values lie in [-1, 1], where a half is off by at most 2.5e-4, a sixteenth of an 8-bit
+step, at half the bytes and time of float32. Heights are float32, since they are differentiated. A one-channel EXR is
+"Y", OpenEXR's name for grey.
+glTF conventions: albedo.png is sRGB; orm.png is linear, R occlusion (1 where none is baked), G roughness, B metallic;
+normal.png is linear, (n + 1) / 2, +Y up.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.asset.maps import Maps
+from stages.core.artifact import write_exr
+from stages.core.color import srgb_decode
+from stages.core.images import write_png
+from stages.core.parallel import in_parallel
+
+PNG_LEVEL = 3
+"""zlib's level: within 2 % of the bytes of level 6, in two thirds of the time."""
+
+SRGB_BINS = 1 << 16
+"""Entries of the linear to sRGB table; no bin holds two borders between bytes."""
+
+
+def to_8bit(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Linear [0, 1] to bytes, rounded to nearest."""
+    return (np.clip(linear, 0, 1) * np.float32(255) + np.float32(0.5)).astype(np.uint8)
+
+
+def srgb_8bit(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Linear [0, 1] to sRGB bytes, rounded to nearest: a table, then one comparison with the border it may cross."""
+    borders = srgb_decode((np.arange(256) + 0.5) / 255).astype(np.float32)  # the last one is never crossed
+    borders[255] = np.inf
+    table = np.searchsorted(borders, np.arange(SRGB_BINS) / np.float32(SRGB_BINS), side="right").astype(np.uint8)
+    byte = table[np.clip(linear * np.float32(SRGB_BINS), 0, SRGB_BINS - 1).astype(np.uint16)]
+    return byte + (linear >= borders[byte])
+
+
+def normal_8bit(normal: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Unit vectors (H, W, 3) to bytes, dithered by at most half a step so that gentle slopes do not turn into terraces.
+
+    Where nothing leans, the bytes are those that every tool takes for flat: 128, 128, 255.
+    """
+    noise = np.random.default_rng(0).random(normal.shape, np.float32)
+    byte = np.clip((normal + 1) * np.float32(127.5) + noise, 0, 255).astype(np.uint8)
+    byte[(normal[..., :2] == 0).all(-1)] = (128, 128, 255)
+    return byte
+
+
+def write_textures(folder: Path, maps: Maps, grey: bool) -> list[str]:
+    """Write the masters and PNGs of the maps there are, several at a time.
+
+    Args:
+        grey: also roughness.png and metallic.png, which MTL asks for.
+    Returns:
+        the files' names.
+    """
+    pngs, exrs = pictures(maps, grey), masters(maps)
+
+    def write(name: str) -> None:
+        if name in pngs:
+            write_png(folder / name, pngs[name](), PNG_LEVEL)
+        else:
+            write_exr(folder / name, exrs[name]())
+
+    names = [*pngs, *exrs]
+    in_parallel(write, names)
+    return names
+
+
+def pictures(maps: Maps, grey: bool) -> dict[str, Callable[[], NDArray[np.uint8]]]:
+    """PNG by name, made when called."""
+    made: dict[str, Callable[[], NDArray[np.uint8]]] = {
+        "albedo.png": lambda: srgb_8bit(maps.albedo),
+        "orm.png": lambda: orm(maps),
+    }
+    normal = maps.normal
+    if normal is not None:
+        made["normal.png"] = lambda: normal_8bit(normal)
+    if grey:
+        made |= {"roughness.png": lambda: to_8bit(maps.roughness), "metallic.png": lambda: to_8bit(maps.metallic)}
+    return made
+
+
+def masters(maps: Maps) -> dict[str, Callable[[], dict[str, NDArray]]]:
+    """Channels of each EXR by name, made when called."""
+    made = {"albedo.exr": lambda: _colour(maps.albedo), "roughness.exr": lambda: _grey(maps.roughness)}
+    made["metallic.exr"] = lambda: _grey(maps.metallic)
+    normal, height, occlusion = maps.normal, maps.height, maps.occlusion
+    if normal is not None:
+        made["normal.exr"] = lambda: _colour(normal)
+    if occlusion is not None:
+        made["occlusion.exr"] = lambda: _grey(occlusion)
+    if height is not None:
+        made["height.exr"] = lambda: {"Y": height}
+    return made
+
+
+def _colour(values: NDArray) -> dict[str, NDArray]:
+    return {channel: values[..., k].astype(np.float16) for k, channel in enumerate("RGB")}
+
+
+def _grey(values: NDArray) -> dict[str, NDArray]:
+    return {"Y": values.astype(np.float16)}
+
+
+def orm(maps: Maps) -> NDArray[np.uint8]:
+    """glTF's packed texture, (H, W, 3)."""
+    packed = np.full((*maps.roughness.shape, 3), 255, np.uint8)
+    if maps.occlusion is not None:
+        packed[..., 0] = to_8bit(maps.occlusion)
+    packed[..., 1], packed[..., 2] = to_8bit(maps.roughness), to_8bit(maps.metallic)
+    return packed

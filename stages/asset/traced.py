@@ -1,0 +1,76 @@
+"""The mesh of a prep.npz as light meets it, with the normal maps that its source keeps."""
+
+from collections.abc import Collection
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.asset.corners import flipped_loops, gltf_uv, loop_normals, loop_parts, loop_tangents, part_frames, unit
+from stages.asset.passed_on import PassedOn
+from stages.core.artifact import Artifact
+from stages.core.images import decode_image
+from stages.light.normal_maps import REPEAT, NormalMap, NormalMaps
+from stages.light.scene import Scene
+
+
+def traced_scene(prep: Artifact) -> Scene:
+    """The scene of a prepared mesh; normals lean by the source's normal maps, where its UVs were kept."""
+    return Scene(prep["vertices"], prep["triangles"], prep["normals"], source_bumps(prep))
+
+
+def source_bumps(prep: Artifact) -> NormalMaps | None:
+    """The normal maps that the source brings along, or None."""
+    passed_on = PassedOn.of(prep)
+    textures = passed_on.normal_maps()
+    if not textures:
+        return None
+    names = list(textures)
+    maps = [normal_map(passed_on, textures[name]) for name in names]
+    of_part = [names.index(part["material"]) if part["material"] in textures else -1 for part in _parts(prep)]
+    bumps = world_frames(prep, {number for number, row in enumerate(of_part) if row >= 0})
+    of_triangle = np.array(of_part, np.int32)[loop_parts(prep)[prep["triangle_loops"][:, 0]]]
+    return replace(bumps, maps=maps, of_triangle=of_triangle)
+
+
+def baked_bumps(prep: Artifact, normal: NDArray[np.float32]) -> NormalMaps:
+    """A baked normal map (H, W, 3) on the whole mesh."""
+    return replace(world_frames(prep), maps=[NormalMap(normal)])
+
+
+def world_frames(prep: Artifact, parts: Collection[int] | None = None) -> NormalMaps:
+    """UVs and tangent frames of the working mesh, on its outer side, without maps; every triangle shows row 0.
+
+    Args:
+        parts: those whose frames are wanted, all where None.
+    """
+    uv = gltf_uv(prep)
+    tangents = loop_tangents(prep, loop_normals(prep), uv, range(len(_parts(prep))) if parts is None else parts)
+    loops, frames, part = prep["triangle_loops"], part_frames(prep), loop_parts(prep)
+    direction = np.einsum("lij,lj->li", frames[part], tangents[:, :3].astype(np.float64))
+    sign = tangents[:, 3] * np.sign(np.linalg.det(frames))[part]  # a mirror turns cross products round
+    turned = np.where(flipped_loops(prep), -1.0, 1.0)  # the back of the file's surface is this surface's front
+    world = np.concatenate([unit(direction) * turned[:, None], (sign * turned)[:, None]], 1).astype(np.float32)
+    return NormalMaps([], np.zeros(len(loops), np.int32), uv[loops], world[loops])
+
+
+def normal_map(passed_on: PassedOn, info: dict[str, Any]) -> NormalMap:
+    """A source's normal map, decoded. Args: info: glTF's normalTexture."""
+    texture = passed_on.textures[info["index"]]
+    vectors = decode_image(passed_on.images[texture["image"]][2])[..., :3] * np.float32(2) - np.float32(1)
+    sampler = texture.get("sampler", {})
+    wrap = sampler.get("wrapS", REPEAT), sampler.get("wrapT", REPEAT)
+    transform = info.get("extensions", {}).get("KHR_texture_transform")
+    return NormalMap(vectors, info.get("scale", 1.0), None if transform is None else uv_matrix(transform), wrap)
+
+
+def uv_matrix(transform: dict[str, Any]) -> NDArray[np.float64]:
+    """KHR_texture_transform as an affine (2, 3) matrix, rotating as the Khronos viewer and three.js do."""
+    c, s = np.cos(transform.get("rotation", 0.0)), np.sin(transform.get("rotation", 0.0))
+    linear = np.array([[c, s], [-s, c]]) * np.array(transform.get("scale", (1.0, 1.0)))
+    return np.concatenate([linear, np.array(transform.get("offset", (0.0, 0.0)), float)[:, None]], 1)
+
+
+def _parts(prep: Artifact) -> list[dict[str, Any]]:
+    return prep.provenance.extra["parts"]

@@ -1,0 +1,141 @@
+"""From a height map to the normal map that shows it, in the tangent space in which every client reads it.
+
+The height of each texel is differenced within its own chart only, over the UV layout, and its gradient is carried into
+space by the triangle's own Jacobian: mirrored, turned or stretched UVs give the same relief. The surface normal then
+leans by minus that gradient, and is written in the tangent frame that the reader will interpolate at this texel.
+Source: Mikkelsen 2010, "Bump Mapping Unparametrized Surfaces on the GPU" (surface gradients, which add up); 2020,
+"Surface Gradient-Based Bump Mapping Framework".
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.bake.raster import Layout, Surface
+from stages.core.parallel import compiled
+from stages.light.normal_maps import NormalMaps, frame
+
+FAR = 4.0
+"""A neighbouring texel farther off in space than this many of a texel's own steps lies beyond a fold of the chart."""
+
+FLAT = 1e-3
+"""Least spread of a texel's neighbours across, against along, for a gradient in both directions."""
+
+
+def relief_normals(
+    height: NDArray[np.float32],
+    surface: Surface,
+    layout: Layout,
+    charts: NDArray[np.int32],
+    corners: tuple[NDArray[np.float32], NDArray[np.float32]],
+    frames: NormalMaps,
+    own: NormalMaps | None,
+) -> NDArray[np.float32]:
+    """The tangent-space normal map of a height map.
+
+    Args:
+        height: (S, S) world units, on the texels of charts. surface: (S, S) the point of each texel. charts: (F,).
+        corners: world positions and unit normals of the triangles' corners, (F, 3, 3) each. frames: tangents of the
+        corners. own: normal maps that the mesh already has, on which the relief lies.
+    Returns:
+        (S, S, 3) unit, +Y up; (0, 0, 1) off the charts.
+    """
+    positions, normals = corners
+    steps = jacobians(layout, positions)
+    carry = inverse_steps(steps)
+    slope = np.zeros((*height.shape, 2), np.float32)
+    _slopes(height, surface.triangle, surface.barycentric, charts, layout.corners, positions, steps, slope)
+    result = np.zeros((*height.shape, 3), np.float32)
+    result[..., 2] = 1
+    for row in range(len(height)):  # one row at a time: the whole of it would take a hundred times the map's bytes
+        on = surface.triangle[row] >= 0
+        if on.any():
+            points = Surface(surface.triangle[row], surface.barycentric[row]).where(on)
+            result[row, on] = _lean(points, slope[row, on], carry, normals, frames, own)
+    return result
+
+
+def _lean(
+    points: Surface, slope: NDArray, carry: NDArray, normals: NDArray, frames: NormalMaps, own: NormalMaps | None
+) -> NDArray[np.float32]:
+    """Tangent-space normals (N, 3) of surface points with a slope (N, 2) in world units a texel."""
+    n = points.interpolate(normals)
+    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+    gradient = np.einsum("nij,nj->ni", carry[points.triangle], slope)
+    gradient -= (gradient * n).sum(1, keepdims=True) * n
+    if own is not None:
+        weights = np.c_[points.barycentric, 1 - points.barycentric.sum(1)]
+        leaning = own.leaning(n, points.triangle, weights)
+        gradient += n - leaning / (leaning * n).sum(1, keepdims=True)
+    t, b = frame(n, points.interpolate(frames.tangents))
+    return in_frame(n - gradient, t, b, n)
+
+
+def in_frame(m: NDArray, t: NDArray, b: NDArray, n: NDArray) -> NDArray[np.float32]:
+    """(x, y, z), unit, along which m = x t + y b + z n; t and n need not be at right angles. (N, 3) each."""
+    lean, along, up = (t * n).sum(1), (m * t).sum(1), (m * n).sum(1)
+    squared = 1 - lean**2
+    vector = np.stack([(along - lean * up) / squared, (m * b).sum(1), (up - lean * along) / squared], 1)
+    return (vector / np.linalg.norm(vector, axis=1, keepdims=True)).astype(np.float32)
+
+
+def jacobians(layout: Layout, positions: NDArray[np.float32]) -> NDArray[np.float64]:
+    """World step of each triangle for a texel to the right and one down, (F, 3, 2); 0 for one without area in UV."""
+    p, t = positions.astype(np.float64), layout.corners
+    edges = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], -1)  # (F, 3, 2)
+    (a, c), (b, d) = (t[:, 1] - t[:, 0]).T, (t[:, 2] - t[:, 0]).T
+    area = a * d - b * c
+    inverse = np.stack([np.stack([d, -b], -1), np.stack([-c, a], -1)], 1)  # of [[a, b], [c, d]], times its determinant
+    sound = np.abs(area) > 0
+    return np.where(sound, 1, 0)[:, None, None] * (edges @ inverse) / np.where(sound, area, 1)[:, None, None]
+
+
+def inverse_steps(steps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What turns a slope a texel into a gradient in space: J (J'J)^-1, (F, 3, 2); 0 where J has no inverse."""
+    gram = np.einsum("fki,fkj->fij", steps, steps)
+    (a, b), (_, d) = np.moveaxis(gram, 0, -1)
+    determinant = a * d - b * b
+    sound = determinant > 1e-12 * (a + d) ** 2
+    adjugate = np.stack([np.stack([d, -b], -1), np.stack([-b, a], -1)], 1)
+    return np.where(sound[:, None, None], steps @ adjugate, 0) / np.where(sound, determinant, 1)[:, None, None]
+
+
+@compiled
+def _slopes(height, triangle, barycentric, charts, layout, positions, steps, slope):  # type: ignore[no-untyped-def]
+    """Least-squares slope of each texel over its four neighbours on the same chart; along one line where they lie on one."""
+    rows, columns = height.shape
+    for i in range(rows):
+        for j in range(columns):
+            f = triangle[i, j]
+            if f < 0:
+                continue
+            xx, xy, yy, xh, yh = 0.0, 0.0, 0.0, 0.0, 0.0
+            for k in range(4):
+                y, x = i + (k == 0) - (k == 1), j + (k == 2) - (k == 3)
+                if y < 0 or x < 0 or y >= rows or x >= columns or triangle[y, x] < 0:
+                    continue
+                g = triangle[y, x]
+                if charts[g] != charts[f]:
+                    continue
+                dx = _at(layout, g, barycentric[y, x], 0) - _at(layout, f, barycentric[i, j], 0)
+                dy = _at(layout, g, barycentric[y, x], 1) - _at(layout, f, barycentric[i, j], 1)
+                apart, expected = 0.0, 0.0
+                for d in range(3):
+                    apart += (_at(positions, g, barycentric[y, x], d) - _at(positions, f, barycentric[i, j], d)) ** 2
+                    expected += (steps[f, d, 0] * dx + steps[f, d, 1] * dy) ** 2
+                if apart > FAR * FAR * expected:
+                    continue
+                dh = height[y, x] - height[i, j]
+                xx, xy, yy, xh, yh = xx + dx * dx, xy + dx * dy, yy + dy * dy, xh + dx * dh, yh + dy * dh
+            determinant, spread = xx * yy - xy * xy, xx + yy
+            if determinant > FLAT * spread * spread:
+                slope[i, j, 0] = (yy * xh - xy * yh) / determinant
+                slope[i, j, 1] = (xx * yh - xy * xh) / determinant
+            elif spread > 0:
+                slope[i, j, 0], slope[i, j, 1] = xh / spread, yh / spread
+
+
+@compiled
+def _at(corners, f, barycentric, d):  # type: ignore[no-untyped-def]
+    """Coordinate d of a point of triangle f."""
+    u, v = barycentric[0], barycentric[1]
+    return u * corners[f, 0, d] + v * corners[f, 1, d] + (1 - u - v) * corners[f, 2, d]
