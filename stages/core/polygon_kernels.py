@@ -1,10 +1,9 @@
 """Compiled ear clipping; `stages.core.polygons.clip_ears` is the plain form of the same."""
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-compiled = numba.njit(nogil=True, cache=True, error_model="numpy")
+from stages.core.parallel import compiled
 
 
 @compiled
