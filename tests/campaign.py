@@ -95,14 +95,16 @@ def called(arguments: list[str]) -> int:
 
 
 def run(arguments: list[str], alone: bool = False, kill: tuple[float, signal.Signals] | None = None) -> Outcome:
-    """Run a command to its end. Args: kill: after how many seconds which signal is sent."""
+    """Run a command to its end. Args: kill: after how many seconds of its own CPU time which signal is sent."""
     with tempfile.TemporaryFile() as stream:
         process = launch(arguments, stream.fileno(), alone)
-        begin, moment = time.monotonic(), kill[0] if kill else CUT_OFF
+        begin = time.monotonic()
         while not (ended := os.wait4(process, os.WNOHANG))[0]:
-            if time.monotonic() - begin > moment:
-                os.kill(process, kill[1] if kill and moment != CUT_OFF else signal.SIGKILL)
-                moment = CUT_OFF
+            if kill and cpu_seconds(process) > kill[0]:
+                os.kill(process, kill[1])
+                kill = None
+            elif time.monotonic() - begin > CUT_OFF:
+                os.kill(process, signal.SIGKILL)
             time.sleep(0.005)
         stream.seek(0)
         text = stream.read().decode(errors="replace")
@@ -110,11 +112,18 @@ def run(arguments: list[str], alone: bool = False, kill: tuple[float, signal.Sig
     return Outcome(os.waitstatus_to_exitcode(ended[1]), text, used.ru_utime + used.ru_stime, used.ru_maxrss / 2**20)
 
 
+def cpu_seconds(process: int) -> float:
+    """CPU time that a process has used so far. Source: proc(5), utime and stime."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def warm_up() -> None:
     """Import what the stages need, without starting any thread."""
     os.environ["OMP_NUM_THREADS"] = "1"
     import torch
 
+    import dreammat_cli.main  # noqa: F401
     import stages.conditions.stage
     import stages.distill.guidance.prior
     import stages.distill.stage
@@ -344,8 +353,8 @@ def killed(reference: Path, folder: Path, count: int, seed: int, tell: Callable[
 
 IN_A_ROW = 3
 
-TYPICAL = {"prep": 0.3, "conditions": 1.0, "distill": 2.0, "bake": 1.0}
-"""Seconds after which a stage is killed, on average."""
+TYPICAL = {"prep": 0.2, "conditions": 1.5, "distill": 3.0, "bake": 1.5}
+"""Seconds of CPU time after which a stage is killed, on average."""
 
 
 def main() -> int:
