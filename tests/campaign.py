@@ -277,8 +277,10 @@ def fault_of(outcome: Outcome, scratch: Path, reference: Path, situation: Situat
         return f"{len(lines)} lines with code {outcome.code}: {lines[0]}"
     if outcome.seconds > SECONDS or outcome.memory > GIBIBYTES:
         return f"{outcome.seconds:.1f} s, {outcome.memory:.2f} GiB"
-    differs = situation.result and results(scratch, situation.result) != results(reference, situation.result)
-    return "code 0, but another result" if outcome.code == 0 and differs and not done.sealed else ""
+    if outcome.code != 0 or not situation.result or done.sealed:
+        return ""
+    same = results(scratch, situation.result) == results(reference, situation.result)
+    return "" if same else "code 0, but another result"
 
 
 def damage_one(reference: Path, number: int, seed: int) -> Report:
@@ -379,7 +381,7 @@ def main() -> int:
         codes = Counter(report.outcome.code for report in reports)
         most = [max((getattr(report.outcome, what) for report in reports), default=0) for what in ("seconds", "memory")]
         print(f"{chosen.damages} damages run: {dict(codes)}, at most {most[0]:.1f} s of CPU, {most[1]:.2f} GiB", flush=True)
-        faults += killed(reference, folder / "killed", chosen.kills, chosen.seed, print)
+        faults += killed(reference, folder / "killed", chosen.kills, chosen.seed, lambda line: print(line, flush=True))
         print(f"{chosen.kills} kills")
     print("\n".join(faults) or "no faults")
     return len(faults)
