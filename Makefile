@@ -26,7 +26,7 @@ BAKE_OPTIONS       ?=
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup demo test campaign lint asset batch bench clean
+.PHONY: help setup demo test campaign hostile lint asset batch bench clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -60,7 +60,7 @@ $(VALIDATOR): | $(VENV)/.ready
 # NAME/mesh.* and NAME/prompt.txt -> prep.npz -> conditions/ -> material.npz -> asset/
 # `prep` always runs: it hashes the mesh, and leaves prep.npz untouched when that is up to date.
 
-MESHES = obj glb gltf ply stl off
+MESHES = obj glb gltf fbx usdz usdc usda usd ply stl off
 
 %/prep.npz: FORCE | $(VENV)/.ready
 	@mesh=$$(cat '$*/mesh.path' 2>/dev/null || ls $(foreach type,$(MESHES),'$*'/*.$(type)) 2>/dev/null | head -n 1); \
@@ -107,6 +107,9 @@ test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION)  ## all tests
 
 campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.campaign --reads 1000 --damages 100 --kills 100
+
+hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through prep within their time (half an hour)
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.prep.hostile
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .

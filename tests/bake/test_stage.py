@@ -129,11 +129,10 @@ def test_relief_and_occlusion_are_written_where_a_material_has_them(
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"]
 
 
-def test_relief_shows_in_the_preview(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_relief_shows_in_the_preview(
+    constant_asset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The picture is shaded with the baked normal map: grooves change it on the object and nowhere else."""
-    prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
-    bake(prep, material, tmp_path / "flat", SMALL)
     flat_maps = stage.bake_maps
     grooves = np.broadcast_to(2e-3 * np.sin(np.arange(512, dtype=np.float32) / 3), (512, 512))
 
@@ -142,8 +141,8 @@ def test_relief_shows_in_the_preview(tmp_path: Path, monkeypatch: pytest.MonkeyP
         return replace(maps, height=np.ascontiguousarray(grooves)), coverage
 
     monkeypatch.setattr(stage, "bake_maps", grooved)
-    bake(prep, material, tmp_path / "grooved", SMALL)
-    views = [read_image(tmp_path / name / "preview.png")[:64] for name in ("flat", "grooved")]
+    bake(constant_asset / "prep.npz", constant_asset / "material.npz", tmp_path / "grooved", SMALL)
+    views = [read_image(folder / "preview.png")[:64] for folder in (constant_asset / "asset", tmp_path / "grooved")]
     differs = np.abs(views[0] - views[1]).max(-1) > 0.02
     assert 0.1 < differs.mean() < 0.7
     assert not differs[:, :2].any()  # the background
