@@ -41,10 +41,10 @@ class Thing(NamedTuple):
 
 def preview(maps: Maps, size: int) -> NDArray[np.float32]:
     """Encoded sRGB, (3 size, 3 size, 3). Args: maps: of a tile. size: pixels along each edge of a picture."""
-    small = [shrunk(a, max(size, 256)) for a in (maps.material, _normals(maps))]
+    material, normal = (shrunk(a, max(size, 256)) for a in (maps.material, _normals(maps)))
     lights = [BUILTIN[name]() for name in LIGHTS]
     cached_light_set(tuple(lights))  # once, not in every thread
-    rows = in_parallel(lambda thing: _pictures(thing, lights, *small, size), (sphere(), plate()))
+    rows = in_parallel(lambda thing: _pictures(thing, lights, material, normal, size), (sphere(), plate()))
     albedo = srgb_encode(shrunk(maps.albedo, size))
     half = albedo[::2, ::2] if size % 2 == 0 else albedo
     repeated = np.tile(srgb_encode(shrunk(maps.albedo, len(half))), (2, 2, 1))[:size, :size]
@@ -55,7 +55,8 @@ def preview(maps: Maps, size: int) -> NDArray[np.float32]:
 
 
 def _normals(maps: Maps) -> NDArray[np.float32]:
-    return maps.normal if maps.normal is not None else np.broadcast_to(np.float32([0, 0, 1]), maps.albedo.shape)
+    flat = np.array([0, 0, 1], np.float32)
+    return maps.normal if maps.normal is not None else np.broadcast_to(flat, maps.albedo.shape)
 
 
 def shrunk(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
@@ -79,7 +80,7 @@ def _pictures(thing: Thing, lights: list, material: NDArray, normal: NDArray, si
     scene = Scene(vertices, triangles, thing.normals, bumps)
     hits = trace_view(scene, thing.c2w, float(FOV_Y), fine, fine)
     uv = np.einsum("pk,pkd->pd", hits.barycentric, down[hits.triangle])
-    values = torch.from_numpy(NormalMapLike(material).at(uv))
+    values = torch.from_numpy(Tile(material).at(uv))
     pictures = []
     for transport in light_transport(scene, hits, lights, RAYS, seed=0):
         white = float(transport.E.mean())
@@ -89,7 +90,7 @@ def _pictures(thing: Thing, lights: list, material: NDArray, normal: NDArray, si
     return pictures
 
 
-class NormalMapLike(NamedTuple):
+class Tile(NamedTuple):
     """Any tile, looked up bilinearly where it repeats."""
 
     values: NDArray[np.float32]

@@ -182,7 +182,7 @@ def test_another_request_replaces_the_folder_and_takes_its_old_files_away(tmp_pa
 @pytest.mark.usefixtures("no_preview")
 def test_an_asset_of_an_older_version_is_replaced_and_a_foreign_folder_is_not(tmp_path: Path) -> None:
     prep = save_prep(tmp_path / "prep.npz", cube())
-    material = save_material(tmp_path / "material.npz", prep, constant_field(MATERIAL))
+    material = save_material(tmp_path / "material.npz", prep, constant(MATERIAL))
     out = tmp_path / "asset"
     out.mkdir()
     (out / "normal.png").write_text("of an older asset")

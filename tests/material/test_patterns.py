@@ -1,5 +1,7 @@
 """Noise, cells, strokes, tiles and threads: their scale, their spectrum, their period, and what a footprint leaves of them."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -47,7 +49,7 @@ def test_a_spectrum_has_the_contrast_it_names_at_every_octave(rise: float) -> No
     spectrum = Spectrum(0.2, 0.0125, rise)
     strengths = spectrum.strengths()
     assert spectrum.octaves == 5 and abs(sum(s * s for s in strengths) - 1) < 1e-9
-    for wide, narrow in zip(strengths, strengths[1:], strict=False):
+    for wide, narrow in itertools.pairwise(strengths):
         assert narrow == pytest.approx(rise * wide)
     assert fbm(at, spectrum).std() == pytest.approx(1, abs=0.15)
 

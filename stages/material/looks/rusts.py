@@ -9,7 +9,7 @@ from stages.material.place import Place
 
 def rust(at: Place) -> Look:
     """Iron rusted through: dark scale, orange bloom, flakes, pits."""
-    bent = warped(at, 0.006, 0.03, 1, 3)
+    bent = warped(at, 0.0025, 0.03, 1, 3)
     crust = Spectrum(0.12, 0.0006, 0.85, tails=0.2, patch=0.4)
     age = fbm(bent, crust, 2)
     grit = fbm(at, Spectrum(0.008, 0.0004, 1.1, tails=0.5, patch=0.5), 3)
