@@ -17,6 +17,7 @@ from stages.asset.traced import baked_bumps, traced_scene, world_frames
 from stages.asset.wavefront import write_obj
 from stages.bake.fill import fill_unseen, pad
 from stages.bake.options import BakeOptions
+from stages.bake.page import report_page
 from stages.bake.preview import contact_sheet
 from stages.bake.raster import Layout, Surface, touched_texels
 from stages.bake.relief import relief_normals
@@ -111,8 +112,11 @@ def bake(
         open_folder(out)
         maps, coverage = bake_maps(subject, made, field, options, progress)
         maps = with_normals(subject, maps)
+        subject = replace(subject, scene=shown_scene(subject, maps))
         files, notes = write_asset(out, subject, maps, options, progress)
         report = {**describe(mesh, made), **coverage, **notes}
+        where = (subject.scene, subject.touched)
+        files.append(report_page(out, mesh, made, *where, maps.material, files, report, options.preview_size, progress))
         write_manifest(out, ASSET, Provenance(wanted.options, wanted.seed, inputs, report), files)
         measured["texture_size"] = options.size
     return BakeResult(out, False, sorted(files), report)
@@ -175,6 +179,11 @@ def with_normals(subject: Subject, maps: Maps) -> Maps:
     return replace(maps, normal=normals)
 
 
+def shown_scene(subject: Subject, maps: Maps) -> Scene:
+    """The scene with the normals that the asset's own normal map gives."""
+    return subject.scene if maps.normal is None else subject.scene.bumped(baked_bumps(subject.mesh, maps.normal))
+
+
 def mend_unseen(subject: Subject, views: Views, maps: NDArray[np.float32], progress: Progress) -> float:
     """Fill, in place, the texels that no view saw from seen surface nearby; all stay when none was seen.
 
@@ -210,8 +219,6 @@ def write_asset(
     """Write textures, models and preview. Returns: the files' names; what the models could not hold."""
     progress("files", 0, 1)
     mesh, scene = subject.mesh, subject.scene
-    if maps.normal is not None:
-        scene = scene.bumped(baked_bumps(mesh, maps.normal))
     is_obj = mesh.provenance.extra["source_format"] == "obj"
     files = write_textures(out, maps, grey=is_obj)
     names = {part["material"] for part in mesh.provenance.extra["parts"]}

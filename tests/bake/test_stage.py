@@ -38,8 +38,14 @@ MATERIAL = (0.6, 0.3, 0.05, 0.35, 0.8)
 
 @pytest.fixture
 def no_preview(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests that look at other files: a blank preview."""
+    """For tests that look at other files: a blank preview and an empty report."""
+
+    def blank(out: Path, *args: object) -> str:
+        (out / "report.html").write_text("")
+        return "report.html"
+
     monkeypatch.setattr(stage, "contact_sheet", lambda *args: np.zeros((4, 4, 3), np.float32))
+    monkeypatch.setattr(stage, "report_page", blank)
 
 
 TEXTURES = {"albedo.exr", "roughness.exr", "metallic.exr", "albedo.png", "orm.png"}
@@ -59,7 +65,7 @@ def test_all_files_are_there_and_the_manifest_knows_their_hashes(constant_asset:
     folder = constant_asset / "asset"
     provenance, files = read_manifest(folder, ASSET)
     obj = {"roughness.png", "metallic.png", "model.obj", "model.mtl"}
-    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png"}
+    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png", "report.html"}
     assert all(sha256_file(folder / name) == digest for name, digest in files.items())
     assert {path.name for path in folder.iterdir()} == {*files, "bake.json", "run.json"}
     assert provenance.inputs["prep"] == sha256_file(constant_asset / "prep.npz")
@@ -291,6 +297,14 @@ def test_bilinear_look_up_at_centres_between_them_and_beyond() -> None:
     maps = np.array([[[0.0], [1.0]], [[2.0], [3.0]]], "f4")  # v is up: the first row is at v = 0.75
     uv = np.array([[0.25, 0.75], [0.75, 0.25], [0.5, 0.5], [-1, 2], [0.5, 0.75]], "f4")
     np.testing.assert_allclose(bilinear(maps, uv)[:, 0], [0, 3, 1.5, 0, 0.5], atol=1e-6)
+
+
+def test_the_report_says_what_the_asset_is(constant_asset: Path) -> None:
+    page = (constant_asset / "asset" / "report.html").read_text()
+    for said in ("a thing", "thing.obj", "12 triangles", "512 × 512 texels", "made new"):
+        assert said in page
+    for name in read_manifest(constant_asset / "asset", ASSET)[1]:
+        assert name == "report.html" or sha256_file(constant_asset / "asset" / name) in page
 
 
 def test_golden_bake(tmp_path: Path, golden: Golden) -> None:
