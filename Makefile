@@ -7,7 +7,6 @@ DREAMMAT := $(RUN)/dreammat
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 VALIDATOR := $(VENV)/.validator
 DIFFUSION := $(VENV)/.diffusion
-EXPORTERS := $(VENV)/.exporters
 MITSUBA := $(VENV)/.mitsuba
 CYCLES  := $(VENV)/.cycles
 CHROMIUM := $(VENV)/.chromium
@@ -30,7 +29,7 @@ BAKE_OPTIONS       ?=
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup demo test campaign lint asset batch export bench clean
+.PHONY: help setup demo test campaign hostile lint asset batch export bench clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -54,11 +53,6 @@ $(DIFFUSION): pyproject.toml constraints.txt | $(VENV)/.ready
 	$(INSTALL) --editable '.[sd]'
 	@touch $@
 
-# the packages that write USD, MaterialX and small GLB files
-$(EXPORTERS): pyproject.toml constraints.txt | $(VENV)/.ready
-	$(INSTALL) --editable '.[web,usd,materialx]'
-	@touch $@
-
 # the Khronos glTF validator, where npm can get it; its test says so and skips otherwise
 $(VALIDATOR): | $(VENV)/.ready
 	@npm install --silent --no-audit --no-fund --prefix $(VENV) gltf-validator >/dev/null 2>&1 || \
@@ -75,7 +69,7 @@ $(CHROMIUM): | $(VENV)/.ready
 # NAME/mesh.* and NAME/prompt.txt -> prep.npz -> conditions/ -> material.npz -> asset/
 # `prep` always runs: it hashes the mesh, and leaves prep.npz untouched when that is up to date.
 
-MESHES = obj glb gltf ply stl off
+MESHES = obj glb gltf fbx usdz usdc usda usd ply stl off
 
 %/prep.npz: FORCE | $(VENV)/.ready
 	@mesh=$$(cat '$*/mesh.path' 2>/dev/null || ls $(foreach type,$(MESHES),'$*'/*.$(type)) 2>/dev/null | head -n 1); \
@@ -117,16 +111,19 @@ asset: $(VENV)/.ready  ## one mesh and prompt: make asset MESH=chair.obj PROMPT=
 batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
 	$(MAKE) $(patsubst %/prompt.txt,%/asset/bake.json,$(wildcard $(JOBS)/*/prompt.txt))
 
-export: $(EXPORTERS)  ## every asset of JOBS for another program: make export JOBS=jobs FOR=unreal
+export: $(VENV)/.ready  ## every asset of JOBS for another program: make export JOBS=jobs FOR=unreal
 	@for manifest in $(JOBS)/*/asset/bake.json; do \
 	[ -f "$$manifest" ] || { echo "$(JOBS): no folder there holds an asset; make batch JOBS=$(JOBS)" >&2; exit 1; }; \
 	job=$${manifest%/asset/bake.json}; $(DREAMMAT) export "$$job/asset" -o "$$job/$(FOR)" --for $(FOR) || exit; done
 
-test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION) $(EXPORTERS) $(CHROMIUM)  ## all tests
+test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION) $(CHROMIUM)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
 
 campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.campaign --reads 1000 --damages 100 --kills 100
+
+hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through prep within their time (half an hour)
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.prep.hostile
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .

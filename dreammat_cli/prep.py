@@ -31,7 +31,7 @@ DEFAULT = defaults(PrepOptions)
               metavar="N", help="A larger mesh does not try xatlas.")
 @common_options
 def command(mesh: Path, output: Path, common: Common, **chosen: object) -> None:
-    """Read, check, mend, orient and unwrap MESH (.obj .ply .stl .off .glb .gltf).
+    """Read, check, mend, orient and unwrap MESH (.obj .ply .stl .off .glb .gltf .fbx .usd).
 
     The source's vertices, faces, UVs and frame are kept beside the working mesh, for `bake` to give back.
     """

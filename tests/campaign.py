@@ -95,14 +95,16 @@ def called(arguments: list[str]) -> int:
 
 
 def run(arguments: list[str], alone: bool = False, kill: tuple[float, signal.Signals] | None = None) -> Outcome:
-    """Run a command to its end. Args: kill: after how many seconds which signal is sent."""
+    """Run a command to its end. Args: kill: after how many seconds of its own CPU time which signal is sent."""
     with tempfile.TemporaryFile() as stream:
         process = launch(arguments, stream.fileno(), alone)
-        begin, moment = time.monotonic(), kill[0] if kill else CUT_OFF
+        begin = time.monotonic()
         while not (ended := os.wait4(process, os.WNOHANG))[0]:
-            if time.monotonic() - begin > moment:
-                os.kill(process, kill[1] if kill and moment != CUT_OFF else signal.SIGKILL)
-                moment = CUT_OFF
+            if kill and cpu_seconds(process) > kill[0]:
+                os.kill(process, kill[1])
+                kill = None
+            elif time.monotonic() - begin > CUT_OFF:
+                os.kill(process, signal.SIGKILL)
             time.sleep(0.005)
         stream.seek(0)
         text = stream.read().decode(errors="replace")
@@ -110,11 +112,18 @@ def run(arguments: list[str], alone: bool = False, kill: tuple[float, signal.Sig
     return Outcome(os.waitstatus_to_exitcode(ended[1]), text, used.ru_utime + used.ru_stime, used.ru_maxrss / 2**20)
 
 
+def cpu_seconds(process: int) -> float:
+    """CPU time that a process has used so far. Source: proc(5), utime and stime."""
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def warm_up() -> None:
     """Import what the stages need, without starting any thread."""
     os.environ["OMP_NUM_THREADS"] = "1"
     import torch
 
+    import dreammat_cli.main  # noqa: F401
     import stages.conditions.stage
     import stages.distill.guidance.prior
     import stages.distill.stage
@@ -268,8 +277,10 @@ def fault_of(outcome: Outcome, scratch: Path, reference: Path, situation: Situat
         return f"{len(lines)} lines with code {outcome.code}: {lines[0]}"
     if outcome.seconds > SECONDS or outcome.memory > GIBIBYTES:
         return f"{outcome.seconds:.1f} s, {outcome.memory:.2f} GiB"
-    differs = situation.result and results(scratch, situation.result) != results(reference, situation.result)
-    return "code 0, but another result" if outcome.code == 0 and differs and not done.sealed else ""
+    if outcome.code != 0 or not situation.result or done.sealed:
+        return ""
+    same = results(scratch, situation.result) == results(reference, situation.result)
+    return "" if same else "code 0, but another result"
 
 
 def damage_one(reference: Path, number: int, seed: int) -> Report:
@@ -344,8 +355,8 @@ def killed(reference: Path, folder: Path, count: int, seed: int, tell: Callable[
 
 IN_A_ROW = 3
 
-TYPICAL = {"prep": 0.3, "conditions": 1.0, "distill": 2.0, "bake": 1.0}
-"""Seconds after which a stage is killed, on average."""
+TYPICAL = {"prep": 0.2, "conditions": 1.5, "distill": 3.0, "bake": 1.5}
+"""Seconds of CPU time after which a stage is killed, on average."""
 
 
 def main() -> int:
@@ -370,7 +381,7 @@ def main() -> int:
         codes = Counter(report.outcome.code for report in reports)
         most = [max((getattr(report.outcome, what) for report in reports), default=0) for what in ("seconds", "memory")]
         print(f"{chosen.damages} damages run: {dict(codes)}, at most {most[0]:.1f} s of CPU, {most[1]:.2f} GiB", flush=True)
-        faults += killed(reference, folder / "killed", chosen.kills, chosen.seed, print)
+        faults += killed(reference, folder / "killed", chosen.kills, chosen.seed, lambda line: print(line, flush=True))
         print(f"{chosen.kills} kills")
     print("\n".join(faults) or "no faults")
     return len(faults)

@@ -103,11 +103,12 @@ def _part(
 def vertex_runs(prep: Artifact) -> list[tuple[list[int], int, int]]:
     """Parts that share vertices, with the first source vertex of their run and the one after its last.
 
-    The parts of a GLB own runs of vertices, as they do in the file; in every other format all parts share all vertices.
+    The parts of a GLB, an FBX or a USD file own runs of vertices, as they do in the file; in every other format all parts
+    share all vertices.
     A vertex that no face uses belongs to the run before it.
     """
     count, parts = len(prep["source_vertices"]), len(prep.provenance.extra["parts"])
-    if prep.provenance.extra["source_format"] != "glb":
+    if prep.provenance.extra["source_format"] not in ("glb", "fbx", "usd"):
         return [(list(range(parts)), 0, count)]
     low, high = np.full(parts, count, np.int64), np.full(parts, -1, np.int64)
     np.minimum.at(low, loop_parts(prep), prep["loop_vertex"])

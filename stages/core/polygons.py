@@ -22,12 +22,13 @@ def triangulate(loop_start: NDArray, corners: NDArray) -> tuple[NDArray[np.int32
     step = np.arange(len(face)) - first_triangle[face]
     first = np.asarray(loop_start)[:-1][face]
     loops = np.stack([first, first + step + 1, first + step + 2], -1).astype(np.int32)
-    for polygon in _folded(loops, face, counts, corners):
-        begin, end = first_triangle[polygon], first_triangle[polygon] + counts[polygon] - 2
-        start = loop_start[polygon]
-        ears = _clip_ears(corners[start : start + counts[polygon]])
-        if ears is not None:
-            loops[begin:end] = ears + start
+    folded = _folded(loops, face, counts, corners)
+    if len(folded):
+        from stages.core.polygon_kernels import clip_all  # numba takes half a second to import
+
+        starts = np.asarray(loop_start, np.int64)[folded]
+        points = np.ascontiguousarray(corners, np.float64)
+        clip_all(starts, counts[folded].astype(np.int64), points, first_triangle[folded].astype(np.int64), loops)
     return loops, face
 
 
@@ -42,9 +43,10 @@ def _folded(loops: NDArray, face: NDArray, counts: NDArray, corners: NDArray) ->
     return np.unique(face[many][wrong])
 
 
-def _clip_ears(corners: NDArray) -> NDArray[np.int32] | None:
-    """Ear clipping of one polygon projected along its normal; None when it has no ear (it crosses itself).
+def clip_ears(corners: NDArray) -> NDArray[np.int32] | None:
+    """Ear clipping of one polygon (n, 3) projected along its normal; None when it has no ear (it crosses itself).
 
+    The plain form of `stages.core.polygon_kernels.clip`, which may choose other ears.
     Source: Meisters 1975, "Polygons Have Ears".
     """
     centred = corners - corners.mean(0)

@@ -32,7 +32,7 @@ PREP = Schema(
         "face_group": Field("i4", ("P",)),  # entry of extra["groups"], or -1
         "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, [0, 1], v up
     },
-    # source_format: "obj" | "ply" | "stl" | "off" | "glb"; uv_kept: bool; findings: what was found and mended;
+    # source_format: "obj" | "ply" | "stl" | "off" | "glb" | "fbx" | "usd"; uv_kept: bool; findings: what was found and mended;
     # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row)}
     # groups: names of an OBJ's groups; passed_on: what materials of a glTF had besides, see `stages.asset.passed_on`
     extra=("source_format", "source_name", "uv_kept", "parts", "groups", "passed_on", "findings"),

@@ -12,18 +12,25 @@ from stages.core.artifact import reason
 from stages.core.beside import beside
 from stages.core.errors import InputError
 
-_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "KHR_lights_", "KHR_mesh_quantization",
-             "KHR_animation_", "KHR_xmp", "KHR_node_visibility")  # fmt: skip
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+DRACO = "KHR_draco_mesh_compression"
+_UNDERSTOOD = (DRACO, *MESHOPT, "KHR_mesh_quantization", "EXT_mesh_gpu_instancing", "KHR_node_visibility")
+# what changes nothing of the geometry
+_HARMLESS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_", "MSFT_lod", "KHR_lights_", "EXT_lights_",
+             "KHR_animation_", "KHR_xmp", "KHR_node_", "KHR_interactivity", "KHR_physics_", "KHR_audio", "EXT_mesh_features",
+             "EXT_mesh_manifold", "EXT_structural_metadata", "CESIUM_")  # fmt: skip
+_MOST = 2**28  # elements of an accessor, vertices of all instances: more is no mesh but a trap
 
 
 @dataclass
 class Gltf:
-    """The parsed file. buffers: bytes by index, read when first asked for."""
+    """The parsed file. buffers, views: bytes by index, read or unpacked when first asked for."""
 
     path: Path
     root: dict[str, Any]
     chunk: bytes | None
     buffers: dict[int, bytes] = field(default_factory=dict)
+    views: dict[int, bytes] = field(default_factory=dict)
 
     def item(self, kind: str, index: Any) -> dict[str, Any]:
         """Entry `index` of the top-level array `kind`. Raises: InputError."""
@@ -32,8 +39,15 @@ class Gltf:
             raise InputError(f"{self.path}: refers to {kind}[{index}], but has {len(entries)}; export it again")
         return entries[index]
 
+    def bounded(self, count: int, what: str) -> int:
+        """`count`, if memory can hold as many. Raises: InputError."""
+        if not 0 <= count <= _MOST:
+            raise InputError(f"{self.path}: {count} {what}, expected {_MOST} at most; export it again")
+        return count
+
 
 def open_gltf(path: Path) -> Gltf:
+    """Parse .glb or .gltf. Raises: InputError where it needs an extension that is not read."""
     data = path.read_bytes()
     text, chunk = _chunks(data, path) if data.startswith(b"glTF") else (data, None)
     try:
@@ -45,7 +59,8 @@ def open_gltf(path: Path) -> Gltf:
     version = root.get("asset", {}).get("version") if isinstance(root, dict) else None
     if not str(version).startswith("2."):
         raise InputError(f"{path}: glTF version {version}, expected 2.0; export it again")
-    foreign = [name for name in root.get("extensionsRequired", []) if not name.startswith(_HARMLESS)]
+    required = root.get("extensionsRequired", [])
+    foreign = [name for name in required if name not in _UNDERSTOOD and not str(name).startswith(_HARMLESS)]
     if foreign:
         raise InputError(f"{path}: needs the glTF extension {foreign[0]}, which is not read; export it without")
     return Gltf(path, root, chunk)
@@ -95,13 +110,22 @@ def read_beside(path: Path, uri: str) -> bytes:
 
 
 def companions(path: Path) -> dict[str, Path]:
-    """Files beside a .gltf that hold its buffers, and those of its images that are there: URI -> path. Raises: InputError."""
+    """Files beside a .gltf that hold its buffers, and those of its images and fallbacks that are there: URI -> path.
+
+    Raises: InputError.
+    """
     root = open_gltf(path).root
     found: dict[str, Path] = {}
     for kind in ("buffers", "images"):
         for entry in root.get(kind, []):
             uri = entry.get("uri") if isinstance(entry, dict) else None
             if isinstance(uri, str) and not uri.startswith("data:"):
-                with contextlib.nullcontext() if kind == "buffers" else contextlib.suppress(InputError):
+                needed = kind == "buffers" and not is_fallback(entry)
+                with contextlib.nullcontext() if needed else contextlib.suppress(InputError):
                     found[uri] = beside(path, uri)
     return found
+
+
+def is_fallback(entry: dict[str, Any]) -> bool:
+    """Whether a buffer only stands in for compressed ones, and may be missing."""
+    return any(entry.get("extensions", {}).get(name, {}).get("fallback") for name in MESHOPT)

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.prep.source import Source
-from stages.prep.topology import components, edges
+from stages.prep.source import Source, rows_of
+from stages.prep.topology import components, corner_links, edges
 
 _UNIT = (0.9, 1.1)  # lengths that pass for a unit normal
 _AGREES = 1e-3  # least cosine between a corner's normal and its face
@@ -28,14 +28,9 @@ def creased(vertices: NDArray, triangles: NDArray, crease_angle: float) -> NDArr
     """
     normal, area = face_normals(vertices, triangles)
     pairs = edges(triangles).pairs
-    face, corner = pairs // 3, pairs % 3
+    face = pairs // 3
     smooth = (normal[face[:, 0]] * normal[face[:, 1]]).sum(-1) > np.cos(np.radians(crease_angle))
-    face, corner = face[smooth], corner[smooth]
-    ends = [3 * face + corner, 3 * face + (corner + 1) % 3]  # the edge's two corners, in either face
-    reverse = triangles.reshape(-1)[ends[0][:, 0]] != triangles.reshape(-1)[ends[0][:, 1]]
-    a, b = (np.where(reverse, e1, e0) for e0, e1 in ((ends[0][:, 1], ends[1][:, 1]), (ends[1][:, 1], ends[0][:, 1])))
-    links = np.concatenate([np.stack([ends[0][:, 0], a], -1), np.stack([ends[1][:, 0], b], -1)])
-    fan = components(3 * len(triangles), links)
+    fan = components(3 * len(triangles), corner_links(triangles, pairs[smooth]))
     weight = (area[:, None] * corner_angles(vertices, triangles)).reshape(-1, 1)
     weighted = np.repeat(normal, 3, 0) * weight
     mean = np.stack([np.bincount(fan, weighted[:, k]) for k in range(3)], -1)[fan].reshape(-1, 3, 3)
@@ -62,13 +57,13 @@ def authored(source: Source, loops: NDArray, to_world: NDArray) -> NDArray[np.fl
     with np.errstate(invalid="ignore", over="ignore"):
         length = np.linalg.norm(raw, axis=-1)
         usable = (rows >= 0) & (length > _UNIT[0]) & (length < _UNIT[1])
-    part = source.loop_part()[loops[:, 0]]
-    for index, entry in enumerate(source.parts):
-        mine = usable & (part == index)[:, None]
-        linear = to_world[:3, :3] @ np.reshape(entry.transform, (4, 4))[:3, :3]
-        if mine.any() and np.linalg.det(linear) != 0:
-            turned = raw[mine] @ np.linalg.inv(linear)  # rows times the inverse: the inverse transpose of columns
-            result[mine] = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+    face_part = source.loop_part()[loops[:, 0]]
+    for part, faces in zip(source.parts, rows_of(face_part, len(source.parts)), strict=True):
+        linear = to_world[:3, :3] @ np.reshape(part.transform, (4, 4))[:3, :3]
+        if np.linalg.det(linear) != 0:
+            # rows times the inverse: the inverse transpose of columns
+            turned = np.where(usable[faces, :, None], raw[faces], np.nan) @ np.linalg.inv(linear)
+            result[faces] = turned / np.linalg.norm(turned, axis=-1, keepdims=True)
     return result
 
 

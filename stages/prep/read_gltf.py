@@ -2,8 +2,9 @@
 the textures of its materials that are not made anew.
 
 Own reader, because general ones flip v and re-index vertices. Source: glTF 2.0 specification, sections 3.5 to 3.7. A
-part is one primitive of one mesh on one node; vertices keep the order of their accessors, v = 0 is the top row.
-Skins, morph targets and animations are counted and left out: the mesh is taken as stored.
+part is one primitive of one mesh on one node, or on one instance of it; vertices keep the order of their accessors, v = 0
+is the top row. Skins are applied in their default pose and morph targets with their default weights; animations are left
+out, and so is what is hidden.
 """
 
 from dataclasses import dataclass, field
@@ -14,31 +15,64 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.errors import InputError
-from stages.prep.gltf_file import Gltf, buffer_bytes, open_gltf
+from stages.prep.gltf_data import accessor, unpacked
+from stages.prep.gltf_file import DRACO, Gltf, open_gltf
+from stages.prep.gltf_nodes import Nodes, morphed, skinned
 from stages.prep.gltf_textures import material_name, pass_on
-from stages.prep.source import Part, Source, check_range, polygons
+from stages.prep.source import IDENTITY, Part, Source, check_range, polygons
 
-_COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Vertices that primitives share: the first rows of positions, normals, tangents (-1: none), UV sets; the count.
+
+    triangles: (T, 3) vertices, where they are packed together with them.
+    """
+
+    position: int
+    normal: int
+    tangent: int
+    uv: list[int]
+    count: int
+    triangles: NDArray[np.int64] | None
+
+
+@dataclass
+class _Rows:
+    """Arrays of one kind, joined at the end. count: rows so far."""
+
+    blocks: list[NDArray]
+    count: int = 0
+
+    def add(self, values: NDArray | None, shape: tuple[int, int], what: str, path: Path) -> int:
+        """Append values. Returns: the first of their rows, -1 for none. Raises: InputError."""
+        if values is None:
+            return -1
+        if values.shape != shape:
+            raise InputError(f"{path}: a primitive's {what} is {values.shape}, expected {shape}")
+        self.blocks.append(values.astype(self.blocks[0].dtype))
+        self.count += len(values)
+        return self.count - len(values)
+
+    def joined(self) -> NDArray:
+        return np.concatenate(self.blocks)
 
 
 @dataclass
 class _Geometry:
-    """What is gathered while the scene is walked; arrays are joined at the end."""
+    """What is gathered while the scene is walked."""
 
-    positions: list[NDArray] = field(default_factory=list)
-    uv: list[NDArray] = field(default_factory=list)
-    normals: list[NDArray] = field(default_factory=list)
-    tangents: list[NDArray] = field(default_factory=list)
-    corners: list[tuple[NDArray, ...]] = field(default_factory=list)  # vertex, uv, normal, tangent rows
-    face_part: list[NDArray] = field(default_factory=list)
+    positions: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 3))]))
+    uv: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 2))]))  # of all sets
+    normals: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 3), np.float32)]))
+    tangents: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 4), np.float32)]))
+    corners: list[tuple[NDArray, _Block]] = field(default_factory=list)  # vertices within the block
     parts: list[Part] = field(default_factory=list)
     skipped: dict[str, int] = field(default_factory=dict)
-    blocks: dict[tuple, tuple[int, ...]] = field(default_factory=dict)  # (node, accessors) -> first rows
-
-    def skip(self, what: str, count: int = 1) -> None:
-        self.skipped[what] = self.skipped.get(what, 0) + count
+    applied: dict[str, int] = field(default_factory=dict)
+    blocks: dict[tuple, _Block] = field(default_factory=dict)
 
 
 def read_gltf(path: Path) -> Source:
@@ -46,179 +80,130 @@ def read_gltf(path: Path) -> Source:
     gltf = open_gltf(path)
     try:
         geometry = _gather(gltf)
-        passed_on, images = pass_on(gltf, geometry.skip)
+        passed_on, images = pass_on(gltf, lambda what: _count(geometry.skipped, what))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise InputError(f"{path}: not valid glTF 2.0 ({type(error).__name__}: {error}); export it again") from None
-    corners = [np.concatenate(rows) if rows else np.zeros(0, np.int64) for rows in zip(*geometry.corners, strict=True)]
-    vertex, uv, normal, tangent = corners or [np.zeros(0, np.int64)] * 4
-    positions = np.concatenate([np.zeros((0, 3)), *geometry.positions])
+    vertex, positions = _loops(geometry, lambda block: block.position), geometry.positions.joined()
     start, loop_vertex = polygons(np.full(len(vertex) // 3, 3), len(positions), vertex, path)
+    sets = max((len(block.uv) for _, block in geometry.corners), default=0)
+    uv = geometry.uv.joined()
+    first, *more = [_loops(geometry, lambda block, k=k: (*block.uv[k : k + 1], -1)[0]) for k in range(max(sets, 1))]
+    face_part = np.repeat(np.arange(len(geometry.parts)), [len(corner) // 3 for corner, _ in geometry.corners])
     return Source(
-        "glb", positions, np.concatenate([np.zeros((0, 2)), *geometry.uv]),
-        np.concatenate([np.zeros((0, 3), np.float32), *geometry.normals]), start, loop_vertex, uv.astype(np.int32),
-        normal.astype(np.int32), np.concatenate(geometry.face_part).astype(np.int32), geometry.parts, v_down=True,
-        skipped=geometry.skipped, tangents=np.concatenate([np.zeros((0, 4), np.float32), *geometry.tangents]),
-        loop_tangent=tangent.astype(np.int32), passed_on=passed_on, images=images,
+        "glb", positions, uv, geometry.normals.joined(), start, loop_vertex,
+        first, _loops(geometry, lambda block: block.normal), face_part.astype(np.int32), geometry.parts, v_down=True,
+        skipped=geometry.skipped, applied=geometry.applied, more_uv=[(uv, rows) for rows in more],
+        tangents=geometry.tangents.joined(), loop_tangent=_loops(geometry, lambda block: block.tangent),
+        passed_on=passed_on, images=images,
     )  # fmt: skip
 
 
-# ---------------------------------------------------------------------------------------------------- accessors
-
-
-def _accessor(gltf: Gltf, index: int) -> NDArray:
-    """An accessor's elements, (N, width), in the stored type; normalised integers become float32 (section 3.11)."""
-    entry = gltf.item("accessors", index)
-    dtype, width = np.dtype(_COMPONENTS[entry["componentType"]]), _WIDTHS[entry["type"]]
-    count = entry["count"]
-    if "bufferView" in entry:
-        values = _view(gltf, entry["bufferView"], entry.get("byteOffset", 0), count, width, dtype)
-    else:
-        values = np.zeros((count, width), dtype)
-    if "sparse" in entry:
-        values = _sparse(gltf, entry["sparse"], values)
-    if entry.get("normalized") and dtype.kind in "iu":
-        scaled = values.astype(np.float64) / np.iinfo(dtype).max
-        values = np.maximum(scaled, -1.0).astype(np.float32)
-    return values
-
-
-def _view(gltf: Gltf, index: int, offset: int, count: int, width: int, dtype: np.dtype) -> NDArray:
-    """`count` rows of a buffer view, honouring its stride."""
-    view = gltf.item("bufferViews", index)
-    if "EXT_meshopt_compression" in view.get("extensions", {}) and "uri" not in gltf.item("buffers", view["buffer"]):
-        raise InputError(
-            f"{gltf.path}: needs the glTF extension EXT_meshopt_compression, which is not read; export without"
-        )
-    row = width * dtype.itemsize
-    stride = view.get("byteStride") or row
-    start = view.get("byteOffset", 0) + offset
-    data = buffer_bytes(gltf, view["buffer"])
-    if count < 0 or start < 0 or (count and start + stride * (count - 1) + row > len(data)):
-        raise InputError(f"{gltf.path}: bufferViews[{index}] reaches past the end of its buffer; export it again")
-    strided = np.ndarray((count, row), np.uint8, data, start, (stride, 1)) if count else np.zeros((0, row), np.uint8)
-    return np.ascontiguousarray(strided).view(dtype).reshape(count, width)
-
-
-def _sparse(gltf: Gltf, sparse: dict[str, Any], values: NDArray) -> NDArray:
-    """Values with the sparse replacements of section 3.6.2.3."""
-    at, new, count = sparse["indices"], sparse["values"], sparse["count"]
-    dtype = np.dtype(_COMPONENTS[at["componentType"]])
-    rows = _view(gltf, at["bufferView"], at.get("byteOffset", 0), count, 1, dtype)[:, 0].astype(np.int64)
-    check_range(rows, len(values), "element", gltf.path)
-    values = values.copy()
-    values[rows] = _view(gltf, new["bufferView"], new.get("byteOffset", 0), count, values.shape[1], values.dtype)
-    return values
-
-
-# ---------------------------------------------------------------------------------------------------- scene
+def _loops(geometry: _Geometry, first: Any) -> NDArray[np.int32]:
+    """(L,) the row of each corner, where first(block) is a block's first one, or -1."""
+    rows = [np.where(first(block) >= 0, first(block) + corner, -1) for corner, block in geometry.corners]
+    return np.concatenate([np.zeros(0, np.int64), *rows]).astype(np.int32)
 
 
 def _gather(gltf: Gltf) -> _Geometry:
-    """Walk the default scene (all root nodes where there is none), parents before children, in file order."""
-    geometry = _Geometry()
-    stack = [(index, np.eye(4)) for index in reversed(_roots(gltf))]
-    visits = 0
-    while stack:
-        index, parent = stack.pop()
-        node = gltf.item("nodes", index)
-        visits += 1
-        if visits > len(gltf.root["nodes"]):
-            raise InputError(f"{gltf.path}: its nodes form a loop; export it again")
-        transform = parent @ _local_transform(node)
-        stack += [(child, transform) for child in reversed(node.get("children", []))]
-        if "mesh" in node:
-            if "skin" in node:
-                geometry.skip("skins")
-            _add_mesh(gltf, geometry, index, node, transform)
+    """Walk the default scene, depth first, in the order of the file."""
+    nodes, geometry = Nodes(gltf), _Geometry()
+    for index in nodes.of_scene():
+        if "mesh" in nodes.entries[index]:
+            if nodes.visible[index]:
+                _add_node(gltf, geometry, nodes, index)
+            else:
+                _count(geometry.skipped, "hidden_nodes")
     for kind in ("animations", "cameras"):
         if gltf.root.get(kind):
-            geometry.skip(kind, len(gltf.root[kind]))
+            _count(geometry.skipped, kind, len(gltf.root[kind]))
     return geometry
 
 
-def _roots(gltf: Gltf) -> list[int]:
-    if gltf.root.get("scenes"):
-        return list(gltf.item("scenes", gltf.root.get("scene", 0)).get("nodes", []))
-    nodes = gltf.root.get("nodes", [])
-    children = {child for node in nodes for child in node.get("children", [])}
-    return [index for index in range(len(nodes)) if index not in children]
+def _count(counts: dict[str, int], what: str, count: int = 1) -> None:
+    counts[what] = counts.get(what, 0) + count
 
 
-def _local_transform(node: dict[str, Any]) -> NDArray[np.float64]:
-    """A node's matrix, or translation * rotation * scale (section 3.5.3)."""
-    if "matrix" in node:
-        return np.array(node["matrix"], np.float64).reshape(4, 4).T
-    x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1)), np.float64)
-    matrix = np.eye(4)
-    matrix[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    matrix[:3, :3] *= np.array(node.get("scale", (1, 1, 1)), np.float64)
-    matrix[:3, 3] = node.get("translation", (0, 0, 0))
-    return matrix
+def _add_node(gltf: Gltf, geometry: _Geometry, nodes: Nodes, index: int) -> None:
+    """Add the parts of a node's mesh, once for each of its instances."""
+    node = nodes.entries[index]
+    name = node.get("name") or f"node_{index}"
+    joints = nodes.joints(node["skin"]) if "skin" in node else None
+    transforms, instanced = nodes.instances(index)
+    if joints is not None:
+        _count(geometry.applied, "skins_in_their_default_pose")
+    if instanced:
+        _count(geometry.applied, "instances", len(transforms))
+    for number, transform in enumerate(transforms):
+        part = Part("", "", f"{name}_{number}" if instanced else name, tuple(float(x) for x in transform.reshape(-1)))
+        _add_mesh(gltf, geometry, (index, number), node, joints, part)
 
 
-def _add_mesh(gltf: Gltf, geometry: _Geometry, node_index: int, node: dict, transform: NDArray) -> None:
+def _add_mesh(
+    gltf: Gltf, geometry: _Geometry, key: tuple[int, int], node: dict, joints: NDArray | None, at: Part
+) -> None:
+    """Add the parts of a mesh on the node and with the transform of `at`. key: (node, instance)."""
     mesh = gltf.item("meshes", node["mesh"])
     name = mesh.get("name") or f"mesh_{node['mesh']}"
-    flat = tuple(float(x) for x in transform.reshape(-1))
+    weights = node.get("weights") or mesh.get("weights") or []
     for primitive in mesh["primitives"]:
         mode = primitive.get("mode", _TRIANGLES)
         if mode < _TRIANGLES:
-            geometry.skip("points" if mode == _POINTS else "lines")
+            _count(geometry.skipped, "points" if mode == _POINTS else "lines")
+            continue
+        if "POSITION" not in primitive["attributes"]:
+            _count(geometry.skipped, "primitives_without_positions")
             continue
         if "targets" in primitive:
-            geometry.skip("morph_targets", len(primitive["targets"]))
+            _count(geometry.applied, "morph_targets_with_their_default_weights", len(primitive["targets"]))
         material = ""
         if "material" in primitive:
             gltf.item("materials", primitive["material"])
             material = material_name(gltf.root["materials"], primitive["material"])
-        corners = _add_vertices(gltf, geometry, node_index, primitive)
-        triangles = _triangles(gltf, primitive, mode, corners[-1])
-        geometry.face_part.append(np.full(len(triangles), len(geometry.parts)))
-        geometry.parts.append(Part(name, material, node.get("name") or f"node_{node_index}", flat))
-        flat_index = triangles.reshape(-1)
-        check_range(flat_index, corners[-1], "vertex", gltf.path)
-        geometry.corners.append(tuple(np.where(first >= 0, first + flat_index, -1) for first in corners[:-1]))
+        posed = joints if "JOINTS_0" in primitive["attributes"] else None
+        block = _block(gltf, geometry, key, primitive, weights, posed)
+        triangles = _triangles(gltf, primitive, mode, block.count) if block.triangles is None else block.triangles
+        corner = triangles.reshape(-1)
+        check_range(corner, block.count, "vertex", gltf.path)
+        gltf.bounded(geometry.positions.count, "vertices")
+        geometry.corners.append((corner, block))
+        geometry.parts.append(Part(name, material, at.node, at.transform if posed is None else IDENTITY))
 
 
-def _add_vertices(gltf: Gltf, geometry: _Geometry, node: int, primitive: dict) -> tuple[int, ...]:
-    """First rows of a primitive's positions, UVs, normals and tangents (-1: none) and their count.
-
-    Primitives of one node that share their accessors share the rows.
-    """
-    if "KHR_draco_mesh_compression" in primitive.get("extensions", {}):
-        view = gltf.item("accessors", primitive["attributes"]["POSITION"])
-        if "bufferView" not in view:
-            raise InputError(f"{gltf.path}: needs the glTF extension KHR_draco_mesh_compression, which is not read; "
-                             "export without")  # fmt: skip
-    attributes = primitive["attributes"]
-    names = [attributes.get(name) for name in ("POSITION", "TEXCOORD_0", "NORMAL", "TANGENT")]
-    key = (node, *names)
-    count = gltf.item("accessors", names[0])["count"]
+def _block(
+    gltf: Gltf, geometry: _Geometry, at: tuple[int, int], primitive: dict, weights: list, joints: NDArray | None
+) -> _Block:
+    """A primitive's vertices, morphed and posed. Primitives of one node that share their accessors share them."""
+    needed = {name: index for name, index in primitive["attributes"].items() if _is_needed(name)}
+    key = (*at, repr([sorted(needed.items()), primitive.get("targets"), primitive.get("extensions", {}).get(DRACO)]))
     if key not in geometry.blocks:
-        stores = (geometry.positions, geometry.uv, geometry.normals, geometry.tangents)
-        firsts = []
-        for accessor, store, width in zip(names, stores, (3, 2, 3, 4), strict=True):
-            if accessor is None:
-                firsts.append(-1)
-                continue
-            values = _accessor(gltf, accessor)
-            if values.shape != (count, width):
-                raise InputError(f"{gltf.path}: accessors[{accessor}] is {values.shape}, expected {(count, width)}")
-            firsts.append(sum(len(block) for block in store))
-            exact = store is geometry.positions or store is geometry.uv
-            store.append(values.astype(np.float64 if exact else np.float32))
-        geometry.blocks[key] = tuple(firsts)
-    return (*geometry.blocks[key], count)
+        draco = unpacked(gltf, primitive)
+        attributes = draco[0] if draco else {name: accessor(gltf, index) for name, index in needed.items()}
+        attributes = morphed(gltf, attributes, primitive.get("targets", []), weights)
+        if joints is not None:
+            attributes = skinned(gltf, attributes, joints)
+        if joints is not None or any(weights):
+            attributes.pop("TANGENT", None)  # those of another pose
+        count = len(attributes["POSITION"])
+        sets = sorted(name for name in attributes if name.startswith("TEXCOORD_"))
+        geometry.blocks[key] = _Block(
+            geometry.positions.add(attributes["POSITION"], (count, 3), "POSITION", gltf.path),
+            geometry.normals.add(attributes.get("NORMAL"), (count, 3), "NORMAL", gltf.path),
+            geometry.tangents.add(attributes.get("TANGENT"), (count, 4), "TANGENT", gltf.path),
+            [geometry.uv.add(attributes[name], (count, 2), name, gltf.path) for name in sets],
+            count,
+            draco[1] if draco else None,
+        )
+    return geometry.blocks[key]
+
+
+def _is_needed(attribute: str) -> bool:
+    return attribute in ("POSITION", "NORMAL", "TANGENT") or attribute.startswith(("TEXCOORD_", "JOINTS_", "WEIGHTS_"))
 
 
 def _triangles(gltf: Gltf, primitive: dict, mode: int, count: int) -> NDArray[np.int64]:
     """Vertex indices (T, 3) of a triangle list, strip or fan (section 3.7.2.1)."""
     indexed = "indices" in primitive
-    index = _accessor(gltf, primitive["indices"])[:, 0].astype(np.int64) if indexed else np.arange(count)
+    index = accessor(gltf, primitive["indices"])[:, 0].astype(np.int64) if indexed else np.arange(count)
     if mode == _TRIANGLES:
         return index[: len(index) // 3 * 3].reshape(-1, 3)
     i = np.arange(max(len(index) - 2, 0))

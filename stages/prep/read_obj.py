@@ -1,9 +1,11 @@
 """Wavefront OBJ. Faces keep their polygons; a part is one object (or group) with one material.
 
 Read: v (extra numbers such as colours are ignored), vt with one to three numbers, vn, f in all four forms with
-negative indices, o, g, usemtl, comments, lines continued with a backslash. Counted and left out: lines, points, curves.
+negative indices, o, g, usemtl, comments, lines continued with a backslash; any Unicode encoding. Counted and left out:
+lines, points, curves.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -11,9 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.errors import InputError
+from stages.prep import text
 from stages.prep.source import Part, Source, check_range, polygons
 
 _IGNORED = {b"mtllib", b"s", b"vp", b"mg", b"lod", b"shadow_obj", b"trace_obj", b"bevel", b"c_interp", b"d_interp"}
+_STATEMENTS = _IGNORED | {b"v", b"vt", b"vn", b"f", b"o", b"g", b"usemtl", b"l", b"p", b"#"}
 
 
 @dataclass
@@ -51,11 +55,13 @@ def _scan(data: bytes) -> _Content:
     content = _Content()
     names = {b"o": "", b"g": "", b"usemtl": ""}
     part = -1
-    for line in data.removeprefix(b"\xef\xbb\xbf").replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
+    for line in _lines(text.plain(data)):
         words = line.split()
         if not words or words[0].startswith(b"#"):
             continue
         keyword = words[0]
+        if b"#" in line and keyword not in names:
+            words = text.uncommented(line).split()
         if keyword in content.rows:
             content.rows[keyword].append(words[1:])
         elif keyword == b"f":
@@ -63,7 +69,7 @@ def _scan(data: bytes) -> _Content:
                 part = content.parts.setdefault((names[b"o"], names[b"g"], names[b"usemtl"]), len(content.parts))
             _add_face(content, words[1:], part)
         elif keyword in names:
-            names[keyword] = b" ".join(words[1:]).decode("utf-8", "replace")
+            names[keyword] = text.name(b" ".join(words[1:]))
             part = -1
         elif keyword not in _IGNORED:
             kind = {b"l": "lines", b"p": "points"}.get(keyword, "other_statements")
@@ -71,9 +77,24 @@ def _scan(data: bytes) -> _Content:
     return content
 
 
+def _lines(data: bytes) -> Iterator[bytes]:
+    """The file's lines, joined where one ends in a backslash: not in a comment, and not before another statement."""
+    pending = b""
+    for line in data.splitlines():
+        if pending:
+            if (line.split(None, 1) or [b""])[0] in _STATEMENTS:
+                yield pending
+            else:
+                line = pending + line
+            pending = b""
+        if line.endswith((b"\\", b"\\ ", b"\\\t")) and text.uncommented(line) is line:
+            pending = line.rstrip()[:-1] + b" "
+        else:
+            yield line
+    yield pending
+
+
 def _add_face(content: _Content, corners: list[bytes], part: int) -> None:
-    if b"#" in corners:
-        corners = corners[: corners.index(b"#")]
     if len(corners) < 3:
         content.skipped["faces_with_fewer_than_3_corners"] = (
             content.skipped.get("faces_with_fewer_than_3_corners", 0) + 1
@@ -97,21 +118,14 @@ def _numbers(rows: list[list[bytes]], width: int, keyword: str, path: Path) -> N
         return np.array([_row(row, width, least, keyword, path) for row in rows], np.float64).reshape(-1, width)
 
 
-def _row(row: list[bytes], width: int, least: int, keyword: str, path: Path) -> list[float]:
-    """One row number by number: what is written for not-a-number by some compilers is taken as such."""
-    text = " ".join([keyword, *(word.decode("utf-8", "replace") for word in row)])
+def _row(row: list[bytes], width: int, least: int, keyword: str, path: Path) -> NDArray[np.float64]:
+    """One row by itself, to take what stands for not-a-number as such or to say what is wrong."""
+    line = text.name(b" ".join([keyword.encode(), *row]))[:60]
     if len(row) < least:
-        raise InputError(
-            f"{path}: '{text[:60]}' has {len(row)} numbers, expected {width}; the file is damaged or cut off"
-        )
-    values = []
-    for word in [*row[:width], b"0"][:width]:
-        try:
-            values.append(float(word))
-        except ValueError:
-            if b"#" not in word and b"nan" not in word.lower():
-                raise InputError(f"{path}: '{text[:60]}' is not made of numbers; export the mesh again") from None
-            values.append(float("nan"))
+        raise InputError(f"{path}: '{line}' has {len(row)} numbers, expected {width}; the file is damaged or cut off")
+    values = text.numbers([*row[:width], b"0"][:width])
+    if len(values) < width:
+        raise InputError(f"{path}: '{line}' is not made of numbers; export the mesh again")
     return values
 
 
@@ -125,7 +139,7 @@ def _indices(content: _Content, sizes: tuple[int, int, int], path: Path) -> list
         try:
             number = np.array(words, dtype="S").astype(np.int64) if words else np.zeros(0, np.int64)
         except ValueError:
-            wrong = next(word for word in words if not word.lstrip(b"+-").isdigit()).decode("utf-8", "replace")
+            wrong = text.name(next(word for word in words if not word.lstrip(b"+-").isdigit()))
             raise InputError(f"{path}: a face has the corner '{wrong[:40]}', expected whole numbers") from None
         row = np.where(number < 0, before[:, column] + number, number - 1)
         named = number != 0
@@ -139,8 +153,8 @@ def _parts(content: _Content, stem: str) -> tuple[NDArray[np.int32], list[Part]]
     keys = list(content.parts)
     by_object = any(name for name, _, _ in keys)
     nodes = [(name if by_object else group, material) for name, group, material in keys]
-    unique = list(dict.fromkeys(nodes))
-    to_unique = np.array([unique.index(node) for node in nodes], np.int32)
+    unique = {node: row for row, node in enumerate(dict.fromkeys(nodes))}
+    to_unique = np.array([unique[node] for node in nodes], np.int32)
     parts = [Part(name or stem, material, name if by_object else "") for name, material in unique]
     return to_unique[np.array(content.face_part, np.int32)], parts
 
@@ -148,6 +162,6 @@ def _parts(content: _Content, stem: str) -> tuple[NDArray[np.int32], list[Part]]
 def _groups(content: _Content) -> tuple[NDArray[np.int32], list[str]]:
     """The group of each face, -1 for none, and the groups' names."""
     of_key = [group for _, group, _ in content.parts]
-    names = list(dict.fromkeys(group for group in of_key if group))
-    numbers = np.array([names.index(group) if group else -1 for group in of_key], np.int32)
-    return numbers[np.array(content.face_part, np.int32)], names
+    rows = {group: row for row, group in enumerate(dict.fromkeys(filter(None, of_key)))}
+    numbers = np.array([rows.get(group, -1) for group in of_key], np.int32)
+    return numbers[np.array(content.face_part, np.int32)], list(rows)

@@ -44,12 +44,14 @@ def repair(source: Source, up: str, weld_tolerance: float, path: Path) -> Workin
     """
     placed = source.placed_vertices()
     finite = (np.abs(placed) <= np.finfo(np.float32).max).all(1)
-    loops, _ = triangulate(source.loop_start, placed[source.loop_vertex])
+    largest = np.abs(placed[finite]).max(initial=0)  # so that no product of coordinates over- or underflows
+    loops, _ = triangulate(source.loop_start, placed[source.loop_vertex] / (largest if largest > 0 else 1.0))
     loops = _as_seen(loops, source)
     corners = source.loop_vertex[loops]
     usable = finite[corners].all(1)
     if not usable.any():
-        raise InputError(f"{path}: no face has finite vertices ({int((~finite).sum())} are not); export the mesh again")
+        found = f"{int((~finite).sum())} vertices are not finite, or beyond 3.4e38"
+        raise InputError(f"{path}: no face has finite vertices ({found}); export the mesh again")
     used = np.unique(corners[usable])
     to_world = normalising(placed[used], up, path)
     world = np.zeros_like(placed)
@@ -68,7 +70,8 @@ def repair(source: Source, up: str, weld_tolerance: float, path: Path) -> Workin
 
 def _as_seen(loops: NDArray, source: Source) -> NDArray:
     """Loops with triangles of mirroring nodes turned round (glTF 2.0, section 3.7.4)."""
-    mirrored = np.array([np.linalg.det(np.reshape(part.transform, (4, 4))[:3, :3]) < 0 for part in source.parts])
+    transforms = np.reshape([part.transform for part in source.parts], (-1, 4, 4))
+    mirrored = np.linalg.slogdet(transforms[:, :3, :3])[0] < 0
     flip = mirrored[source.loop_part()[loops[:, 0]]]
     return np.where(flip[:, None], loops[:, [0, 2, 1]], loops)
 

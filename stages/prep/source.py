@@ -4,7 +4,8 @@ A *loop* is one corner of one face, in the order of the file. Readers repair not
 they cannot take literally.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -43,6 +44,8 @@ class Source:
     v_down: whether v = 0 is the top of the image. tangents: (SG, 4) float32; loop_tangent: (L,) rows of these.
     passed_on, images: what materials have besides colour, see `stages.asset.passed_on`.
     skipped: what the file holds besides triangles and polygons, with its count.
+    applied: what made these vertices out of the file's (skins, morph targets, instances). more_uv: further UV sets, uv and
+    loop_uv of each.
     """
 
     format: str
@@ -57,6 +60,8 @@ class Source:
     parts: list[Part]
     v_down: bool = False
     skipped: dict[str, int] = field(default_factory=dict)
+    applied: dict[str, int] = field(default_factory=dict)
+    more_uv: list[tuple[NDArray[np.float64], NDArray[np.int32]]] = field(default_factory=list)
     face_group: NDArray[np.int32] | None = None
     groups: list[str] = field(default_factory=list)
     tangents: NDArray[np.float32] = field(default_factory=lambda: np.zeros((0, 4), np.float32))
@@ -64,14 +69,19 @@ class Source:
     passed_on: dict[str, Any] = field(default_factory=nothing_passed_on)
     images: list[bytes] = field(default_factory=list)
 
+    def by_uv_set(self) -> list["Source"]:
+        """This source, and itself with each further UV set in the first one's place; tangents and the textures passed on
+        belong to the first."""
+        bare = replace(self, tangents=self.tangents[:0], loop_tangent=None, passed_on=nothing_passed_on(), images=[])
+        return [self, *(replace(bare, uv=uv, loop_uv=loop_uv) for uv, loop_uv in self.more_uv)]
+
     def placed_vertices(self) -> NDArray[np.float64]:
         """(SV, 3) vertices with node transforms applied; an unreferenced vertex stays as it is."""
         placed = self.vertices.copy()
         part_of_vertex = np.full(len(placed), -1)
         part_of_vertex[self.loop_vertex] = self.loop_part()
-        for index, part in enumerate(self.parts):
+        for part, mine in zip(self.parts, rows_of(part_of_vertex, len(self.parts)), strict=True):
             if part.transform != IDENTITY:
-                mine = part_of_vertex == index
                 with np.errstate(invalid="ignore", over="ignore"):
                     placed[mine] = transform_points(np.reshape(part.transform, (4, 4)), placed[mine])
         return placed
@@ -79,6 +89,13 @@ class Source:
     def loop_part(self) -> NDArray[np.int32]:
         """(L,) the part of each loop."""
         return np.repeat(self.face_part, np.diff(self.loop_start))
+
+
+def rows_of(labels: NDArray, count: int) -> list[NDArray[np.int64]]:
+    """The rows of `labels` that are 0, those that are 1, … count - 1."""
+    order = np.argsort(labels, kind="stable")
+    bounds = np.searchsorted(labels[order], np.arange(count + 1))
+    return [order[start:stop] for start, stop in pairwise(bounds)]
 
 
 def polygons(lengths: NDArray, vertices: int, loop_vertex: NDArray, path: Path) -> tuple[NDArray, NDArray]:
@@ -93,6 +110,8 @@ def polygons(lengths: NDArray, vertices: int, loop_vertex: NDArray, path: Path) 
             f"{path}: {vertices} vertices and {len(lengths)} faces, expected a surface; export the mesh again"
         )
     check_range(loop_vertex, vertices, "vertex", path)
+    if len(loop_vertex) >= 2**31:
+        raise InputError(f"{path}: {len(loop_vertex)} corners, expected fewer than 2147483648; split the mesh")
     start = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int32)
     return start, np.asarray(loop_vertex).astype(np.int32)
 

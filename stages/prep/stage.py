@@ -17,11 +17,13 @@ from stages.prep.measure import topology
 from stages.prep.normals import authored, face_normals, shading_normals
 from stages.prep.options import PrepOptions
 from stages.prep.orient import outward
+from stages.prep.read_fbx import read_fbx
 from stages.prep.read_gltf import read_gltf
 from stages.prep.read_obj import read_obj
 from stages.prep.read_off import read_off
 from stages.prep.read_ply import read_ply
 from stages.prep.read_stl import read_stl
+from stages.prep.read_usd import layers, read_usd
 from stages.prep.repair import Working, repair
 from stages.prep.source import Source, nothing_passed_on
 from stages.prep.topology import components, edges
@@ -30,6 +32,12 @@ from stages.prep.uv import loop_uvs, signed_area, unusable, uv_charts
 
 READERS: dict[str, Callable[[Path], Source]] = {
     ".obj": read_obj, ".ply": read_ply, ".stl": read_stl, ".off": read_off, ".glb": read_gltf, ".gltf": read_gltf,
+    ".fbx": read_fbx, ".usd": read_usd, ".usda": read_usd, ".usdc": read_usd, ".usdz": read_usd,
+}  # fmt: skip
+
+# files that a mesh is spread over
+BESIDE: dict[str, Callable[[Path], dict[str, Path]]] = {
+    ".gltf": companions, ".usd": layers, ".usda": layers, ".usdc": layers,
 }  # fmt: skip
 
 
@@ -57,11 +65,12 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
         working = repair(source, options.up, options.weld_tolerance, mesh)
         normals, findings = oriented(source, working, options.crease_angle)
         progress("unwrap", 2, 4)
-        loop_uv, kept, layout = _texture(source, working, options, mesh)
+        source, layout = _with_bakeable_uv(source, working, options, mesh)
+        loop_uv, kept, way = _texture(source, working, options, layout["unusable_uv"])
         uv = loop_uv[working.loops]
         chart = uv_charts(working.triangles, uv)
         measured = topology(working.vertices, working.triangles)
-        findings = _findings(source, working, findings, layout) | measured | {
+        findings = _findings(source, working, findings, layout | way) | measured | {
             "charts": int(chart.max()) + 1,
             "texel_density": _texel_density(working, uv, options.texture_size),
         }
@@ -91,8 +100,8 @@ def _inputs(mesh: Path) -> dict[str, str]:
     inputs = {"mesh": sha256_file(mesh)}
     if mesh.stat().st_size == 0:
         raise InputError(f"{mesh}: is empty; export the mesh again")
-    if suffix == ".gltf":
-        inputs |= {f"mesh:{uri}": sha256_file(path) for uri, path in companions(mesh).items()}
+    if suffix in BESIDE:
+        inputs |= {f"mesh:{name}": sha256_file(path) for name, path in BESIDE[suffix](mesh).items()}
     return inputs
 
 
@@ -112,17 +121,32 @@ def oriented(source: Source, working: Working, crease_angle: float) -> tuple[NDA
     }
 
 
-def _texture(
+def _with_bakeable_uv(
     source: Source, working: Working, options: PrepOptions, path: Path
+) -> tuple[Source, dict[str, Any]]:
+    """The source with the first of its UV sets that can be baked, and which; or as it is, and what is wrong with it.
+
+    Raises: InputError where a set must be kept and none can be.
+    """
+    if options.uv == "new":
+        return source, {"unusable_uv": "new ones asked for", "uv_set": None}
+    _, area = face_normals(working.vertices, working.triangles)
+    problems = []
+    for number, candidate in enumerate(source.by_uv_set()):
+        problems.append(unusable(loop_uvs(candidate)[working.loops], area))
+        if problems[-1] is None:
+            return candidate, {"unusable_uv": None, "uv_set": number}
+    if options.uv == "keep":
+        raise InputError(f"{path}: its UVs cannot be kept: {problems[0]}; mend them or let new ones be made")
+    return source, {"unusable_uv": problems[0], "uv_set": None}
+
+
+def _texture(
+    source: Source, working: Working, options: PrepOptions, problem: str | None
 ) -> tuple[NDArray[np.float32], bool, dict[str, Any]]:
     """UVs of all source loops (L, 2), whether they are the source's, and how they came about."""
-    own = loop_uvs(source)
-    _, area = face_normals(working.vertices, working.triangles)
-    problem = "new ones asked for" if options.uv == "new" else unusable(own[working.loops], area)
     if problem is None:
-        return _everywhere(own, working), True, {"unusable_uv": None, "unwrap": "kept", "gutter": None}
-    if options.uv == "keep":
-        raise InputError(f"{path}: its UVs cannot be kept: {problem}; mend them or let new ones be made")
+        return _everywhere(loop_uvs(source), working), True, {"unwrap": "kept", "gutter": None}
     polygon = np.searchsorted(source.loop_start, working.loops[:, 0], "right") - 1
     seconds = options.unwrap_seconds if len(polygon) <= options.unwrap_triangles else 0.0
     layout = unwrap(
@@ -130,8 +154,7 @@ def _texture(
     )  # fmt: skip
     made = np.full((len(source.loop_vertex), 2), np.nan, np.float32)
     made[working.loops] = layout.uv
-    how = {"unusable_uv": problem, "unwrap": layout.method, "gutter": layout.packing.gutter}
-    return _everywhere(made, working), False, how
+    return _everywhere(made, working), False, {"unwrap": layout.method, "gutter": layout.packing.gutter}
 
 
 def _everywhere(uv: NDArray, working: Working) -> NDArray[np.float32]:
@@ -159,6 +182,7 @@ def _findings(source: Source, working: Working, more: dict[str, Any], layout: di
         **more,
         **layout,
         "skipped": source.skipped,
+        "applied": source.applied,
     }
 
 

@@ -54,3 +54,27 @@ def face_components(ids: NDArray) -> NDArray[np.int32]:
     order = np.argsort(table.edge, kind="stable")
     same = table.edge[order[1:]] == table.edge[order[:-1]]
     return components(len(ids), np.stack([order[:-1][same], order[1:][same]], -1) // 3)
+
+
+def corner_links(triangles: NDArray, pairs: NDArray) -> NDArray[np.int64]:
+    """(2 M, 2) corners 3 f + k at either end of each edge, across it. pairs: (M, 2) half-edges."""
+    face, corner = pairs // 3, pairs % 3
+    start, end = 3 * face + corner, 3 * face + (corner + 1) % 3
+    vertex = triangles.reshape(-1)
+    reverse = vertex[start[:, 0]] != vertex[start[:, 1]]
+    across_start = np.where(reverse, end[:, 1], start[:, 1])
+    across_end = np.where(reverse, start[:, 1], end[:, 1])
+    return np.concatenate([np.stack([start[:, 0], across_start], -1), np.stack([end[:, 0], across_end], -1)])
+
+
+def pinched_vertices(triangles: NDArray) -> int:
+    """Vertices at which more than one fan of faces meets, not counting those of edges with three faces or more."""
+    table = edges(triangles)
+    fan = components(triangles.size, corner_links(triangles, table.pairs))
+    _, first = np.unique(fan, return_index=True)
+    vertex = triangles.reshape(-1)
+    fans = np.bincount(vertex[first], minlength=int(vertex.max()) + 1)
+    crowded = table.faces[table.edge] > 2
+    fans[vertex[crowded]] = 0
+    fans[np.roll(triangles, -1, 1).reshape(-1)[crowded]] = 0
+    return int((fans > 1).sum())

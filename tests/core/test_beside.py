@@ -9,7 +9,8 @@ import pytest
 from stages.core.beside import beside
 from stages.core.errors import InputError
 from stages.light.textured_model import TexturedModel
-from stages.prep.read_gltf import companions, read_gltf
+from stages.prep.gltf_file import companions
+from stages.prep.read_gltf import read_gltf
 
 ELSEWHERE = ("/etc/passwd", "/dev/zero", "file:///etc/passwd", "http://host/a.bin", "C:\\a.bin", "\\\\host\\a.bin",
              "%2Fdev%2Fzero", "../../../../../../dev/zero", "a\0.bin", ".", "gone.bin", "../gone.bin")  # fmt: skip

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from stages.light.scene import Scene
 from stages.prep.orient import outward
 from stages.prep.topology import edges
+from tests.prep.hostile import leaves, slivers
 from tests.prep.shapes import cube, moebius, sphere
 
 
@@ -85,3 +87,47 @@ def test_a_consistent_mesh_is_left_alone() -> None:
     vertices, triangles = sphere()
     winding = outward(vertices / 2, triangles)
     assert not winding.flip.any() and winding.non_orientable == 0 and set(winding.patch) == {0}
+
+
+@pytest.fixture
+def rays(monkeypatch: pytest.MonkeyPatch) -> NDArray[np.int64]:
+    """Counts rays, none of which is blocked."""
+    count = np.zeros(1, np.int64)
+
+    def none_blocked(scene: Scene, origins: NDArray, directions: NDArray) -> NDArray:
+        count[0] += len(origins)
+        return np.zeros(len(origins), bool)
+
+    monkeypatch.setattr(Scene, "occluded", none_blocked)
+    return count
+
+
+@pytest.mark.parametrize("count, effort, samples", [(2, 1e6, 256), (200, 1.5e5, 30), (10_000, 4e5, 1), (10_000, 1e4, 0)])
+def test_the_rays_of_all_open_patches_together_are_bounded(
+    monkeypatch: pytest.MonkeyPatch, rays: NDArray, count: int, effort: float, samples: int
+) -> None:
+    """Each patch has as many points as there is time for, or only the largest have one; a free leaf keeps its side."""
+    monkeypatch.setattr("stages.prep.orient._EFFORT", effort)
+    vertices, triangles = leaves(count)
+    assert not outward(vertices, triangles).flip.any()
+    assert samples * count <= rays[0] / 32 <= max(2 * samples, 0.1) * count
+
+
+def test_slow_rays_are_fewer(monkeypatch: pytest.MonkeyPatch, rays: NDArray) -> None:
+    """A ray among slivers meets many boxes with nothing in them: as many slivers as leaves have a tenth of the rays."""
+    monkeypatch.setattr("stages.prep.orient._EFFORT", 1e5)
+    outward(*leaves(5000))
+    among_leaves = int(rays[0])
+    outward(*slivers(5000))
+    assert 0 < rays[0] - among_leaves < among_leaves / 10
+
+
+def test_the_side_of_many_open_shells_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four hundred cups on a grid, half of them inside out, from 20 points each."""
+    vertices, triangles = sphere(6, 12)
+    cup = triangles[vertices[triangles].mean(1)[:, 2] < 0.8]
+    place = np.stack([*np.mgrid[:20, :20], np.zeros((20, 20))], -1).reshape(-1, 1, 3) / 20
+    faces = (cup + len(vertices) * np.arange(400)[:, None, None]).reshape(-1, 3)
+    turn = np.repeat(np.arange(400) % 2 == 1, len(cup))
+    monkeypatch.setattr("stages.prep.orient._EFFORT", 1e5)
+    assert np.array_equal(outward((vertices / 50 + place).reshape(-1, 3), turned(faces, turn)).flip, turn)

@@ -226,8 +226,8 @@ def broken_gltf(change: str) -> bytes:
         root["nodes"][0]["children"] = [0]
     elif change == "index":
         primitive["indices"] = built.accessor(np.array([0, 1, 9], np.uint8), "SCALAR")
-    elif change == "draco":
-        root["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    elif change == "extension":
+        root["extensionsRequired"] = ["EXT_foreign"]
     elif change == "view":
         root["bufferViews"][0]["byteOffset"] = 4096
     elif change == "version":
@@ -235,7 +235,7 @@ def broken_gltf(change: str) -> bytes:
     elif change == "accessor":
         primitive["attributes"]["POSITION"] = 12
     elif change == "type":
-        root["accessors"][0]["type"] = "MAT4"
+        root["accessors"][0]["type"] = "VEC5"
     elif change == "nothing":
         root["scenes"] = [{"nodes": []}]
     text = json.dumps(root | {"buffers": [{"byteLength": len(built.data)}]}).encode()
@@ -268,7 +268,7 @@ BROKEN: dict[str, tuple[str, str | bytes, str]] = {
     "gltf cut off": ("a.glb", broken_gltf("cut off"), "cut off"),
     "gltf loop": ("a.glb", broken_gltf("loop"), "loop"),
     "gltf index": ("a.glb", broken_gltf("index"), "refers to vertex 9"),
-    "gltf draco": ("a.glb", broken_gltf("draco"), "KHR_draco_mesh_compression"),
+    "gltf extension": ("a.glb", broken_gltf("extension"), "EXT_foreign"),
     "gltf view": ("a.glb", broken_gltf("view"), "past the end"),
     "gltf version": ("a.glb", broken_gltf("version"), "version 1.0"),
     "gltf accessor": ("a.glb", broken_gltf("accessor"), "accessors[12]"),

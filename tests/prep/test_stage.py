@@ -103,7 +103,8 @@ def test_the_same_request_gives_the_same_bytes_and_is_done_once(tmp_path: Path) 
     assert json.loads((tmp_path / "a.npz.run.json").read_text())["seconds"] > 0
 
 
-@pytest.mark.parametrize("scale", [1e-4, 1e4])
+@pytest.mark.parametrize("scale", [1e-4, 1e4, 1e-30, 3e38, 1e-100])
+@pytest.mark.filterwarnings("error:.*encountered")
 def test_scale_does_not_matter(tmp_path: Path, scale: float) -> None:
     vertices, triangles = sphere()
     one = prepared(write_obj(tmp_path / "one.obj", vertices, triangles))
@@ -111,6 +112,15 @@ def test_scale_does_not_matter(tmp_path: Path, scale: float) -> None:
     np.testing.assert_array_equal(one["triangles"], other["triangles"])
     np.testing.assert_allclose(one["vertices"], other["vertices"], atol=1e-7)
     check_promises(other)
+
+
+@pytest.mark.parametrize("scale", [1e38, 1e-30, 1e-100])
+def test_concave_faces_are_cut_at_any_scale(tmp_path: Path, scale: float) -> None:
+    """A fan from the first corner would fold over."""
+    arrow = np.array([(0.3, 0.5, 0), (0, 0, 0), (1, 0.5, 0), (0, 1, 0)])
+    made = prepared(write_obj(tmp_path / "a.obj", arrow * scale, [[2, 3, 0, 1]]))
+    a, b, c = (made["vertices"][made["triangles"][:, k]].astype(float) for k in range(3))
+    assert np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 == pytest.approx(0.35)
 
 
 def unfolded() -> np.ndarray:
@@ -162,7 +172,7 @@ def test_a_card_drawn_on_both_sides_shares_its_texels(tmp_path: Path) -> None:
     [
         ("missing.obj", None, "no such file"),
         ("a.obj", b"", "is empty"),
-        ("a.fbx", b"x", "format '.fbx' is not read"),
+        ("a.blend", b"x", "format '.blend' is not read"),
         ("folder.obj", "folder", "is a folder"),
     ],
 )
