@@ -78,7 +78,7 @@ MATERIAL = Schema(
 )
 
 ASSET = Schema("dreammat.asset", 2, manifest="bake.json")
-"""A folder: albedo, roughness and metallic .exr; albedo.png, orm.png; model.glb; preview.png; bake.json.
+"""A folder: albedo, roughness, metallic and occlusion .exr; albedo.png, orm.png; model.glb; preview.png; bake.json.
 
-Where the material has them: normal .exr and .png, height.exr, occlusion.exr.
+Where the material has them: normal .exr and .png, height.exr.
 """
