@@ -13,10 +13,11 @@ from stages.report.options import (
     PriorReportOptions,
     ReportOptions,
     TransferReportOptions,
+    UnwrapReportOptions,
 )
 
 DEFAULT, PRIOR, DISTILL = defaults(ReportOptions), defaults(PriorReportOptions), defaults(DistillReportOptions)
-OCCLUSION = defaults(OcclusionReportOptions)
+OCCLUSION, UNWRAP = defaults(OcclusionReportOptions), defaults(UnwrapReportOptions)
 
 
 @click.group()
@@ -139,3 +140,21 @@ def occlusion(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
     with reporter(common) as progress:
         rows = report_occlusion(prep, output, options, progress)
     show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, [str(output / "occlusion.png"), *summary(rows)])
+
+
+@command.command()
+@click.argument("prep", type=INPUT, metavar="PREP.npz")
+@click.option("--gutter", type=click.IntRange(0, 512), default=UNWRAP["gutter"], show_default=True, metavar="TEXELS",
+              help="Between xatlas's charts, where PREP.npz kept the source's UVs.")
+@click.option("--seconds", type=click.FloatRange(1), default=UNWRAP["seconds"], show_default=True,
+              help="That xatlas may take.")
+@common_options
+def unwrap(prep: Path, common: Common, **chosen: Any) -> None:
+    """Texture layout of PREP.npz beside what xatlas alone makes: charts, stretch, density."""
+    options = UnwrapReportOptions(**chosen)
+    if plan(common, "measure", prep, options):
+        return
+    from stages.report.unwrap import report_unwrap, summary
+
+    rows = report_unwrap(prep, options)
+    show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, summary(rows))

@@ -53,6 +53,16 @@ class OcclusionReportOptions:
 
 
 @dataclass(frozen=True)
+class UnwrapReportOptions:
+    """Options of the report on a texture layout."""
+
+    gutter: int = 8
+    """least texels between xatlas's charts, where the mesh's UVs were its own"""
+    seconds: float = 600.0
+    """that xatlas may take"""
+
+
+@dataclass(frozen=True)
 class TransferReportOptions:
     """Options of the report on a texture transfer."""
 
