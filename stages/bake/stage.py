@@ -16,6 +16,7 @@ from stages.asset.textures import write_textures
 from stages.asset.traced import baked_bumps, traced_scene, world_frames
 from stages.asset.wavefront import write_obj
 from stages.bake.fill import fill_unseen, pad
+from stages.bake.occlusion import occlusion_map
 from stages.bake.options import BakeOptions
 from stages.bake.page import report_page
 from stages.bake.preview import contact_sheet
@@ -161,9 +162,11 @@ def bake_maps(
     corners = subject.mesh["vertices"][subject.mesh["triangles"]]
     maps = bake_texels(field, corners, subject.layout, subject.touched, options.supersample, progress)
     unseen = mend_unseen(subject, views_of(made), maps, progress)
+    charts, rays = subject.mesh["charts"], options.occlusion_rays
+    occlusion = occlusion_map(subject.scene, subject.touched, charts, rays, subject.open, progress)
     progress("padding", 0, 1)
-    pad(maps, on_chart)
-    return Maps(maps), {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
+    pad(on_chart, maps, occlusion)
+    return Maps(maps, occlusion=occlusion), {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
 
 
 def with_normals(subject: Subject, maps: Maps) -> Maps:
@@ -175,7 +178,7 @@ def with_normals(subject: Subject, maps: Maps) -> Maps:
     normals = relief_normals(
         maps.height, touched, subject.layout, mesh["charts"], (corners, mesh["normals"]), frames, subject.scene.bumps
     )  # fmt: skip
-    pad(normals, touched.triangle >= 0)
+    pad(touched.triangle >= 0, normals)
     return replace(maps, normal=normals)
 
 
@@ -237,8 +240,7 @@ def write_asset(
 def look_of(folder: Path, maps: Maps, passed_on: PassedOn) -> Look:
     """What model.glb's materials show: the PNGs in the folder, and what the source brings that they do not replace."""
     names = ["albedo", "orm"] + ["normal"] * (maps.normal is not None)
-    for made, kind in ((maps.normal, "normalTexture"), (maps.occlusion, "occlusionTexture")):
-        passed_on = passed_on if made is None else passed_on.without(kind)
+    passed_on = passed_on if maps.normal is None else passed_on.without("normalTexture")
     images = {name: (folder / f"{name}.png").read_bytes() for name in names}
     return Look(images, maps.occlusion is not None, passed_on)
 

@@ -32,7 +32,7 @@ from tests.bake.examples import (
 )
 from tests.conftest import Golden
 
-SMALL = BakeOptions(size=512, supersample=1, preview_size=32)
+SMALL = BakeOptions(size=512, supersample=1, preview_size=32, occlusion_rays=16)
 MATERIAL = (0.6, 0.3, 0.05, 0.35, 0.8)
 
 
@@ -48,7 +48,7 @@ def no_preview(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stage, "report_page", blank)
 
 
-TEXTURES = {"albedo.exr", "roughness.exr", "metallic.exr", "albedo.png", "orm.png"}
+TEXTURES = {"albedo.exr", "roughness.exr", "metallic.exr", "occlusion.exr", "albedo.png", "orm.png"}
 
 
 @pytest.fixture(scope="module")
@@ -313,7 +313,7 @@ def test_golden_bake(tmp_path: Path, golden: Golden) -> None:
     material = save_material(tmp_path / "material.npz", prep, small_field())
     result = bake(prep, material, tmp_path / "asset", BakeOptions(size=512, supersample=2, preview_size=32))
     folder = result.folder
-    channels = {name: read_exr(folder / f"{name}.exr").channels for name in ("albedo", "roughness", "metallic")}
+    channels = {name: read_exr(folder / f"{name}.exr").channels for name in ("albedo", "roughness", "metallic", "occlusion")}
     arrays = {f"{name}_{c}": pixels[::8, ::8] for name, pixel in channels.items() for c, pixels in pixel.items()}
     arrays["shares"] = np.array([result.report["coverage"], result.report["unseen"]])
     golden.check("bake/cube_maps", arrays, atol=6e-4)  # one step of a half float near 1 where the last float differs
