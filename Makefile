@@ -9,6 +9,7 @@ VALIDATOR := $(VENV)/.validator
 DIFFUSION := $(VENV)/.diffusion
 MITSUBA := $(VENV)/.mitsuba
 CYCLES  := $(VENV)/.cycles
+CHROMIUM := $(VENV)/.chromium
 
 # one job: make asset MESH=chair.obj PROMPT="a carved oak chair" OUT=assets/chair
 MESH   ?=
@@ -17,6 +18,8 @@ NAME   ?= $(basename $(notdir $(MESH)))
 OUT    ?= assets/$(NAME)
 # a folder of jobs, each a folder with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
 JOBS   ?= jobs
+# what `make export` writes every asset of JOBS for
+FOR    ?= blender
 
 # options of each stage, to override on the command line
 PREP_OPTIONS       ?=
@@ -26,7 +29,7 @@ BAKE_OPTIONS       ?=
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup demo test campaign hostile lint asset batch bench clean
+.PHONY: help setup demo test campaign hostile lint asset batch export bench clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -55,6 +58,12 @@ $(VALIDATOR): | $(VENV)/.ready
 	@npm install --silent --no-audit --no-fund --prefix $(VENV) gltf-validator >/dev/null 2>&1 || \
 	echo "npm cannot install gltf-validator: the test that validates model.glb will be skipped"
 	@mkdir -p $(@D) && touch $@
+
+# Chromium, in which report.html is tested: CI installs it where apt can; elsewhere the tests say so and skip without it
+$(CHROMIUM): | $(VENV)/.ready
+	@command -v chromedriver >/dev/null || { [ -n "$(CI)" ] && { apt-get update && apt-get install -y chromium chromium-driver; } >/dev/null 2>&1; } || \
+	echo "no chromium and chromedriver here: the tests of report.html in a browser will be skipped"
+	@touch $@
 
 # ------------------------------------------------------------------- the stages, one pattern rule each
 # NAME/mesh.* and NAME/prompt.txt -> prep.npz -> conditions/ -> material.npz -> asset/
@@ -102,7 +111,12 @@ asset: $(VENV)/.ready  ## one mesh and prompt: make asset MESH=chair.obj PROMPT=
 batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
 	$(MAKE) $(patsubst %/prompt.txt,%/asset/bake.json,$(wildcard $(JOBS)/*/prompt.txt))
 
-test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION)  ## all tests
+export: $(VENV)/.ready  ## every asset of JOBS for another program: make export JOBS=jobs FOR=unreal
+	@for manifest in $(JOBS)/*/asset/bake.json; do \
+	[ -f "$$manifest" ] || { echo "$(JOBS): no folder there holds an asset; make batch JOBS=$(JOBS)" >&2; exit 1; }; \
+	job=$${manifest%/asset/bake.json}; $(DREAMMAT) export "$$job/asset" -o "$$job/$(FOR)" --for $(FOR) || exit; done
+
+test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION) $(CHROMIUM)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
 
 campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments

@@ -15,6 +15,7 @@ COMMANDS = {
     "conditions": "Ray-trace geometry and light around the mesh.",
     "distill": "Optimise the material for a prompt.",
     "bake": "Write textures and a model with the material.",
+    "export": "Write an asset for Blender, Unreal, Unity, the web, USD or MaterialX.",
     "material": "Write tiling maps of a material from a prompt alone.",
     "report": "Measure speed against error.",
     "train": "Train the diffusion models.",
@@ -50,6 +51,7 @@ def cli() -> None:
     dreammat conditions PREP.npz                    -o CONDITIONS/
     dreammat distill    CONDITIONS/ --prompt TEXT   -o MATERIAL.npz
     dreammat bake       PREP.npz MATERIAL.npz       -o ASSET/
+    dreammat export     ASSET/ --for TARGET         -o FOLDER/
 
     Every command can be stopped and run again: it continues, or says that its output is up to date.
 

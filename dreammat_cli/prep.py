@@ -17,8 +17,9 @@ DEFAULT = defaults(PrepOptions)
               help="The source's up axis: y with front +z, or z with front -y (Blender).")
 @click.option("--texture-size", type=click.IntRange(64, 16384), default=DEFAULT["texture_size"], show_default=True,
               metavar="TEXELS", help="Texture size that new UVs are laid out for.")
-@click.option("--padding", type=click.IntRange(0, 256), default=DEFAULT["padding"], show_default=True, metavar="TEXELS",
-              help="Padding around each chart; charts stand twice this apart.")
+@click.option("--padding", type=click.IntRange(0, 256), default=DEFAULT["padding"], metavar="TEXELS",
+              help="Padding around each chart; charts stand twice this apart.  "
+                   "[default: the widest of 16, 8, 4 and 2 that is worth its cost]")
 @click.option("--crease-angle", type=click.FloatRange(0, 180), default=DEFAULT["crease_angle"], show_default=True,
               metavar="DEGREES", help="A sharper edge stays sharp where the file has no usable normals.")
 @click.option("--weld-tolerance", type=click.FloatRange(0, 0.1), default=DEFAULT["weld_tolerance"], show_default=True,

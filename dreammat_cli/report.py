@@ -7,9 +7,17 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, reporter, show
-from stages.report.options import DistillReportOptions, PriorReportOptions, ReportOptions, TransferReportOptions
+from stages.report.options import (
+    DistillReportOptions,
+    OcclusionReportOptions,
+    PriorReportOptions,
+    ReportOptions,
+    TransferReportOptions,
+    UnwrapReportOptions,
+)
 
 DEFAULT, PRIOR, DISTILL = defaults(ReportOptions), defaults(PriorReportOptions), defaults(DistillReportOptions)
+OCCLUSION, UNWRAP = defaults(OcclusionReportOptions), defaults(UnwrapReportOptions)
 
 
 @click.group()
@@ -109,6 +117,47 @@ def transfer(prep: Path, material: Path, asset: Path, common: Common, reference:
 
     found = dataclasses.asdict(report_transfer(prep, material, asset, reference))
     show(common, found, [f"{name.replace('_', ' '):18} {value:.4g}" for name, value in found.items()])
+
+
+@command.command()
+@click.argument("prep", type=INPUT, metavar="PREP.npz")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV and the picture.")
+@click.option("--size", type=click.IntRange(64, 8192), default=OCCLUSION["size"], show_default=True, metavar="TEXELS",
+              help="Side of the texture.")
+@click.option("--texels", type=click.IntRange(1), default=OCCLUSION["texels"], show_default=True, metavar="N",
+              help="Texels that are compared with float64.")
+@click.option("--rays", type=click.IntRange(1, 1 << 16), multiple=True, default=OCCLUSION["rays"], show_default=True,
+              metavar="N", help="Rays of each point; repeat for more measurements.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=OCCLUSION["seed"], show_default=True, help="Of the texels.")
+@common_options
+def occlusion(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
+    """Ambient occlusion of PREP.npz as `bake` makes it: seconds, and errors beside float64 without rays."""
+    options = OcclusionReportOptions(**chosen)
+    if plan(common, "measure into", output, options):
+        return
+    from stages.report.occlusion import report_occlusion, summary
+
+    with reporter(common) as progress:
+        rows = report_occlusion(prep, output, options, progress)
+    show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, [str(output / "occlusion.png"), *summary(rows)])
+
+
+@command.command()
+@click.argument("prep", type=INPUT, metavar="PREP.npz")
+@click.option("--gutter", type=click.IntRange(0, 512), default=UNWRAP["gutter"], show_default=True, metavar="TEXELS",
+              help="Between xatlas's charts, where PREP.npz kept the source's UVs.")
+@click.option("--seconds", type=click.FloatRange(1), default=UNWRAP["seconds"], show_default=True,
+              help="That xatlas may take.")
+@common_options
+def unwrap(prep: Path, common: Common, **chosen: Any) -> None:
+    """Texture layout of PREP.npz beside what xatlas alone makes: charts, stretch, density."""
+    options = UnwrapReportOptions(**chosen)
+    if plan(common, "measure", prep, options):
+        return
+    from stages.report.unwrap import report_unwrap, summary
+
+    rows = report_unwrap(prep, options)
+    show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, summary(rows))
 
 
 @command.command()

@@ -36,7 +36,7 @@ def mesh(tmp_path: Path) -> Path:
     return path
 
 
-STAGES = ("prep", "conditions", "distill", "bake")
+STAGES = ("prep", "conditions", "distill", "bake", "export")
 TRAINING = ("train prior", "train pictures", "train controlnet")
 
 
@@ -82,6 +82,8 @@ def test_json_is_all_that_stdout_holds(mesh: Path, tmp_path: Path) -> None:
         ("conditions", "p.npz", "-o", "c", "--fov", "45", "25"),
         ("distill", "c", "-o", "m.npz", "--guidance", "magic"),
         ("bake", "p.npz", "m.npz", "-o", "a", "--size", "1000"),
+        ("export", "a", "-o", "e", "--for", "maya"),
+        ("export", "a", "-o", "e"),
         ("train", "pictures", "m", "-o", "p", "--shard", "3/2"),
         ("train", "pictures", "m", "-o", "p", "--shard", "half"),
         ("nonsense",),
@@ -119,6 +121,7 @@ def test_missing_and_foreign_artefacts(mesh: Path, tmp_path: Path) -> None:
     distill = dreammat("distill", tmp_path, "--prompt", "gold", "-o", "m.npz", cwd=tmp_path)
     expect_error(distill, ARTIFACT, "manifest.json")
     expect_error(dreammat("bake", prep, prep, "-o", "a", cwd=tmp_path), ARTIFACT, "dreammat.prep", "dreammat.material")
+    expect_error(dreammat("export", tmp_path, "-o", "e", "--for", "unreal", cwd=tmp_path), ARTIFACT, "bake.json")
     prep.write_bytes(prep.read_bytes()[:-200])
     expect_error(dreammat("conditions", prep, "-o", "c", cwd=tmp_path), ARTIFACT, "prep.npz")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["prep.npz", "prep.npz.run.json", "triangle.obj"]

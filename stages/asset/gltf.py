@@ -35,7 +35,8 @@ class Look:
     """What the materials show.
 
     images: PNG files by name: "albedo" (sRGB), "orm" (linear: R occlusion, G roughness, B metallic) and, where there is
-    relief, "normal" (linear). occlusion: whether R of "orm" holds any. passed_on: what else the source's materials had.
+    relief, "normal" (linear). occlusion: whether R of "orm" holds any, for materials
+    that bring none. passed_on: what else the source's materials had.
     """
 
     images: dict[str, bytes]
@@ -52,7 +53,7 @@ class Look:
         if "normal" in row:
             made["normalTexture"] = {"index": row["normal"]}
         if self.occlusion:
-            made["occlusionTexture"] = {"index": row["orm"]}
+            made.setdefault("occlusionTexture", {"index": row["orm"]})
         return made
 
     def textures(self) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:

@@ -38,17 +38,18 @@ def fill_unseen(
     return np.einsum("nk,nkc->nc", weight.astype(np.float32), values[index])
 
 
-def pad(maps: NDArray[np.float32], on_chart: NDArray[np.bool_]) -> None:
+def pad(on_chart: NDArray[np.bool_], *maps: NDArray[np.float32]) -> None:
     """Give every texel off the charts the values of the nearest texel on one, to the last texel, in place.
 
     Each chart so owns all texels that are nearer to it than to any other: smaller mip levels mix charts as late
     as the layout allows.
 
     Args:
-        maps: (H, W, C). on_chart: (H, W), true somewhere.
+        on_chart: (H, W), true somewhere. maps: (H, W) or (H, W, C) each.
     """
     if not on_chart.any():
         return
     row, column = distance_transform_edt(~on_chart, return_distances=False, return_indices=True)
     off = ~on_chart
-    maps[off] = maps[row[off], column[off]]
+    for values in maps:
+        values[off] = values[row[off], column[off]]

@@ -15,6 +15,7 @@ class BakeOptions:
     size: int = 2048  # texels along each edge, one of SIZES
     supersample: int = 2  # field samples along each edge of a texel, averaged: 2 means 4 samples
     preview_size: int = 320  # pixels along each edge of one view of preview.png
+    occlusion_rays: int = 128  # of each point whose ambient occlusion is traced
 
     def __post_init__(self) -> None:
         """Raises: InputError that names the option, what was found and what is expected."""
@@ -22,5 +23,7 @@ class BakeOptions:
             raise InputError(f"size: {self.size} texels; expected one of {', '.join(map(str, SIZES))}")
         if not 1 <= self.supersample <= 8:
             raise InputError(f"supersample: {self.supersample}; expected 1 to 8 samples along each edge of a texel")
+        if not 1 <= self.occlusion_rays <= 1 << 16:
+            raise InputError(f"occlusion rays: {self.occlusion_rays}; expected 1 to {1 << 16} a point")
         if not 32 <= self.preview_size <= 2048:
             raise InputError(f"preview size: {self.preview_size} pixels; expected 32 to 2048")

@@ -81,7 +81,7 @@ def contact_sheet(
     cached_light_set((light,))  # once, not in every thread
     views = [camera(used, azimuth, elevation) for azimuth, elevation in VIEWS]
     drawn = in_parallel(lambda c2w: draw_view(scene, light, uv, maps, c2w, size), views)
-    cells = [srgb_encode(shaded.over(_backdrop(size))) for shaded, _ in drawn]
+    cells = [srgb_encode(shaded.over(backdrop(size))) for shaded, _ in drawn]
     cells += [*material_cells(drawn[0][1], size), labelled(atlas(maps, size), "albedo.png")]
     progress("preview", 1, 1)
     return np.concatenate([np.concatenate(cells[k : k + COLUMNS], 1) for k in range(0, len(cells), COLUMNS)], 0)
@@ -169,7 +169,7 @@ def _halve(values: NDArray[np.float32]) -> NDArray[np.float32]:
     return values.reshape(height // 2, 2, width // 2, 2, count).mean((1, 3))
 
 
-def _backdrop(size: int) -> NDArray[np.float32]:
+def backdrop(size: int) -> NDArray[np.float32]:
     """A neutral gradient, darker below. Returns: (size, 1, 3) linear."""
     ramp = np.linspace(BACKDROP, GROUND, size, dtype=np.float32)
     return np.repeat(ramp[:, None, None], 3, 2)

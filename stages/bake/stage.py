@@ -17,7 +17,9 @@ from stages.asset.textures import write_textures
 from stages.asset.traced import baked_bumps, traced_scene, world_frames
 from stages.asset.wavefront import write_obj
 from stages.bake.fill import fill_unseen, pad
+from stages.bake.occlusion import occlusion_map
 from stages.bake.options import BakeOptions
+from stages.bake.page import report_page
 from stages.bake.preview import contact_sheet
 from stages.bake.raster import Layout, Surface, touched_texels
 from stages.bake.relief import relief_normals
@@ -113,8 +115,11 @@ def bake(
         open_folder(out)
         maps, coverage = bake_maps(subject, made, learnt, options, progress)
         maps = with_normals(subject, maps)
+        subject = replace(subject, scene=shown_scene(subject, maps))
         files, notes = write_asset(out, subject, maps, options, progress)
         report = {**describe(mesh, made), **coverage, **notes}
+        where = (subject.scene, subject.touched)
+        files.append(report_page(out, mesh, made, *where, maps.material, files, report, options.preview_size, progress))
         write_manifest(out, ASSET, Provenance(wanted.options, wanted.seed, inputs, report), files)
         measured["texture_size"] = options.size
     return BakeResult(out, False, sorted(files), report)
@@ -155,10 +160,12 @@ def bake_maps(
     maps = texels.recipe(options.supersample, progress)
     values = combined(*(torch.from_numpy(a[on_chart]) for a in (maps[..., :5], residual)))
     maps[on_chart, :5] = values.numpy()
+    charts, rays = mesh["charts"], options.occlusion_rays
+    occlusion = occlusion_map(subject.scene, subject.touched, charts, rays, subject.open, progress)
     progress("padding", 0, 1)
-    pad(maps, on_chart)
+    pad(on_chart, maps, occlusion)
     height = np.ascontiguousarray(maps[..., 5]) if learnt.recipe.has_relief else None
-    return Maps(maps[..., :5], height), {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
+    return Maps(np.ascontiguousarray(maps[..., :5]), height, occlusion=occlusion), {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
 
 
 def with_normals(subject: Subject, maps: Maps) -> Maps:
@@ -170,8 +177,13 @@ def with_normals(subject: Subject, maps: Maps) -> Maps:
     normals = relief_normals(
         maps.height, touched, subject.layout, mesh["charts"], (corners, mesh["normals"]), frames, subject.scene.bumps
     )  # fmt: skip
-    pad(normals, touched.triangle >= 0)
+    pad(touched.triangle >= 0, normals)
     return replace(maps, normal=normals)
+
+
+def shown_scene(subject: Subject, maps: Maps) -> Scene:
+    """The scene with the normals that the asset's own normal map gives."""
+    return subject.scene if maps.normal is None else subject.scene.bumped(baked_bumps(subject.mesh, maps.normal))
 
 
 def mend_unseen(subject: Subject, views: Views, residual: NDArray[np.float32], progress: Progress) -> float:
@@ -209,8 +221,6 @@ def write_asset(
     """Write textures, models and preview. Returns: the files' names; what the models could not hold."""
     progress("files", 0, 1)
     mesh, scene = subject.mesh, subject.scene
-    if maps.normal is not None:
-        scene = scene.bumped(baked_bumps(mesh, maps.normal))
     is_obj = mesh.provenance.extra["source_format"] == "obj"
     files = write_textures(out, maps, grey=is_obj)
     names = {part["material"] for part in mesh.provenance.extra["parts"]}
@@ -229,8 +239,7 @@ def write_asset(
 def look_of(folder: Path, maps: Maps, passed_on: PassedOn) -> Look:
     """What model.glb's materials show: the PNGs in the folder, and what the source brings that they do not replace."""
     names = ["albedo", "orm"] + ["normal"] * (maps.normal is not None)
-    for made, kind in ((maps.normal, "normalTexture"), (maps.occlusion, "occlusionTexture")):
-        passed_on = passed_on if made is None else passed_on.without(kind)
+    passed_on = passed_on if maps.normal is None else passed_on.without("normalTexture")
     images = {name: (folder / f"{name}.png").read_bytes() for name in names}
     return Look(images, maps.occlusion is not None, passed_on)
 

@@ -12,21 +12,22 @@ from stages.core.errors import InputError
 
 
 def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
-    """Write an 8-bit PNG atomically.
+    """Write a PNG atomically, of 8 bits, or of 16 where the pixels have them.
 
     Args:
-        pixels: (H, W), (H, W, 3) or (H, W, 4); uint8, or float in [0, 1] already encoded as the file wants it
-        (rounded to nearest, clamped).
+        pixels: (H, W), (H, W, 3) or (H, W, 4); uint8, uint16, or float in [0, 1] already encoded as the file wants it
+        (rounded to nearest, clamped). A fourth channel is stored as it is, and the others are not scaled by it.
         compression: zlib's level, 0 to 9.
     """
-    if pixels.dtype != np.uint8:
+    if pixels.dtype not in (np.uint8, np.uint16):
         pixels = (np.clip(pixels, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
     pixels = np.ascontiguousarray(pixels if pixels.ndim == 3 else pixels[..., None])
     height, width, count = pixels.shape
     with written_atomically(path) as temporary:
         output = oiio.ImageOutput.create(str(temporary))
         assert output is not None, "OpenImageIO was built without PNG"
-        spec = oiio.ImageSpec(width, height, count, "uint8")
+        spec = oiio.ImageSpec(width, height, count, pixels.dtype.name)
+        spec["oiio:UnassociatedAlpha"] = 1
         spec["png:compressionLevel"] = compression
         written = output.open(str(temporary), spec)
         written = written and output.write_image(pixels) and output.close()

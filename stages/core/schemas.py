@@ -98,7 +98,10 @@ MATERIAL = Schema(
 )
 
 ASSET = Schema("dreammat.asset", 2, manifest="bake.json")
-"""A folder: albedo, roughness and metallic .exr; albedo.png, orm.png; model.glb; preview.png; bake.json.
+"""A folder: albedo, roughness, metallic and occlusion .exr; albedo.png, orm.png; model.glb; preview.png; report.html; bake.json.
 
-Where the material has them: normal .exr and .png, height.exr, occlusion.exr.
+Where the material has them: normal .exr and .png, height.exr.
 """
+
+EXPORT = Schema("dreammat.export", 1, manifest="export.json")
+"""A folder that `export` wrote: files for one program, and export.json."""

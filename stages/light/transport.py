@@ -127,14 +127,17 @@ def light_transport(
     return result
 
 
+KEPT = 5
+"""Light sets that are kept: as many as one asset's preview and report are lit by."""
+
 _light_sets: dict[tuple[int, ...], LightSet] = {}
 
 
 def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
-    """The light set of these very objects, kept for the next view (the last two sets are)."""
+    """The light set of these very objects, kept for the next view (the last KEPT sets are)."""
     key = tuple(id(e) for e in environments)
     if key not in _light_sets or _light_sets[key].environments != environments:
-        while len(_light_sets) > 1:
+        while len(_light_sets) >= KEPT:
             _light_sets.pop(next(iter(_light_sets)))
         _light_sets[key] = light_set(list(environments))
     return _light_sets[key]

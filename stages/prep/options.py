@@ -9,7 +9,8 @@ class PrepOptions:
 
     up: the source's up axis, "y" (front +z) or "z" (front -y, as Blender).
     texture_size: edge of the square texture that UVs are laid out for, texels.
-    padding: texels around each chart that `bake` fills; charts stand twice this apart.
+    padding: texels around each chart that `bake` fills, twice this between charts; None: the widest of 16, 8, 4 and 2 (of a
+        texture of 2048) that is worth what it takes from the charts.
     crease_angle: a sharper edge between two faces stays sharp where the file has no usable normals, degrees.
     weld_tolerance: vertices closer than this are one, in diagonals of the bounding box.
     uv: "auto" keeps the source's UVs where they can be baked, "keep" insists on them, "new" always makes new ones.
@@ -19,7 +20,7 @@ class PrepOptions:
 
     up: str = "y"
     texture_size: int = 2048
-    padding: int = 16
+    padding: int | None = None
     crease_angle: float = 40.0
     weld_tolerance: float = 1e-6
     uv: str = "auto"

@@ -11,10 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.core.parallel import compiled
 from stages.prep.topology import edges
 from stages.prep.uv import signed_area, uv_vertices
 
-_CELLS = 512  # cells across the texture
+_CELLS = 2048  # most cells across the texture
+_PADDINGS = ((16, 0.03), (8, 0.18), (4, 0.3), (2, 1.0))
+"""Texels of a texture of 2048, and the share of the charts' scale, beside the last's, that each may take. A padding of 8 keeps
+charts apart in all mip levels down to an eighth of the size, 4 to a quarter, 2 to a half."""
+_FILL = 0.7  # share of the texture that bounding boxes and gutters may take when the scale is estimated
 _STEPS = 9  # bisections of the scale
 _MANY = 3000  # charts; more are laid on shelves
 _ANGLES = 24  # orientations tried for a chart's bounding rectangle, over a quarter turn
@@ -60,6 +65,30 @@ def pack(flat: NDArray, triangles: NDArray, chart: NDArray, texture_size: int, p
     moved = turned(upright * scale, size[chart], turn[chart]) + place[chart][:, None]
     uv = np.clip(moved / texture_size, 0.0, 1.0).astype(np.float32)
     return Packing(uv, scale, 2 * padding)
+
+
+def affordable_padding(flat: NDArray, chart: NDArray, texture_size: int) -> int:
+    """The widest padding, texels, that is worth what it takes from the charts' scale.
+
+    Args:
+        flat: (F, 3, 2) charts in units of length. chart: (F,) from 0.
+    """
+    size = np.zeros((int(chart.max()) + 1, 2))
+    np.maximum.at(size, np.repeat(chart, 3), align(flat, chart).reshape(-1, 2))
+    widths = [max(round(padding * texture_size / 2048), 1) for padding, _ in _PADDINGS]
+    scales = [expected_scale(size, texture_size, padding) for padding in widths]
+    losses = [1 - scale / scales[-1] for scale in scales]
+    return next(padding for padding, loss, (_, most) in zip(widths, losses, _PADDINGS, strict=True) if loss <= most)
+
+
+def expected_scale(size: NDArray, texture_size: int, padding: int) -> float:
+    """Texels per unit at which boxes (C, 2) and gutters fill the texture: sum of (w s + 2 p) (h s + 2 p) = fill * size^2."""
+    a, b = float(size.prod(1).sum()), 2 * padding * float(size.sum())
+    c = 4 * padding**2 * len(size) - _FILL * texture_size**2
+    largest = texture_size / a**0.5
+    if c >= 0:
+        return largest / 100
+    return max((-b + (b * b - 4 * a * c) ** 0.5) / (2 * a), largest / 100)
 
 
 def align(flat: NDArray, chart: NDArray) -> NDArray[np.float64]:
@@ -172,18 +201,28 @@ _Profile = tuple[NDArray, NDArray]  # lowest and highest cell (exclusive) of eac
 
 def _lowest(horizon: NDArray, profile: list[_Profile], cells: int) -> tuple[int, int, int, NDArray] | None:
     """Quarter turn, column and row where a chart's top is lowest, and the horizon above it."""
-    best = None
+    best, lowest = None, cells + 1
     for quarter, (bottom, top) in enumerate(profile):
-        width = len(bottom)
-        if width > cells:
-            continue
-        windows = np.lib.stride_tricks.sliding_window_view(horizon, width)
-        rows = np.maximum((windows - bottom).max(1), 0)
-        height = rows + int(top.max())
-        column = int(np.argmin(height * 4 * cells + rows))
-        if height[column] <= cells and (best is None or height[column] < best[0]):
-            best = (int(height[column]), quarter, column, int(rows[column]), rows[column] + top)
-    return None if best is None else best[1:]
+        column, row = _landing(horizon, bottom, lowest - int(top.max()))
+        if column >= 0:
+            lowest = row + int(top.max())
+            best = quarter, column, row, row + top
+    return best
+
+
+@compiled
+def _landing(horizon, bottom, below):  # type: ignore[no-untyped-def]
+    """Column and row where a chart comes to lie lowest on the horizon, under row `below`; -1, -1 where it does not."""
+    best, at = below, -1
+    for column in range(len(horizon) - len(bottom) + 1):
+        row = 0
+        for j in range(len(bottom)):
+            row = max(row, horizon[column + j] - bottom[j])
+            if row >= best:
+                break
+        if row < best:
+            best, at = row, column
+    return at, (best if at >= 0 else -1)
 
 
 def _profiles(outlines: _Outlines, scale: float, extent: NDArray, margin: int) -> list[list[_Profile]]:

@@ -28,7 +28,7 @@ from stages.prep.repair import Working, repair
 from stages.prep.source import Source, nothing_passed_on
 from stages.prep.topology import components, edges
 from stages.prep.unwrap import unwrap
-from stages.prep.uv import loop_uvs, signed_area, unusable, uv_charts
+from stages.prep.uv import loop_uvs, signed_area, stretch, unusable, uv_charts
 
 READERS: dict[str, Callable[[Path], Source]] = {
     ".obj": read_obj, ".ply": read_ply, ".stl": read_stl, ".off": read_off, ".glb": read_gltf, ".gltf": read_gltf,
@@ -73,6 +73,8 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
         findings = _findings(source, working, findings, layout | way) | measured | {
             "charts": int(chart.max()) + 1,
             "texel_density": _texel_density(working, uv, options.texture_size),
+            "texture_filled": round(float(np.abs(signed_area(uv)).sum()), 3),
+            "stretch": round(stretch(working.vertices[working.triangles], uv), 3),
         }
         progress("write", 3, 4)
         extra = {

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.prep.overlap import overlapping
-from stages.prep.pack import align, outline
+from stages.prep.pack import align, expected_scale, outline
 from stages.prep.topology import edges, renumber
 
 _ROUNDS = 24  # of joining pairs, each of which looks at most triangles anew:
 _EFFORT = 3_000_000  # triangles looked at, after which a large mesh stops; the first rounds save most
-_FILL = 0.7  # share of the texture that bounding boxes and gutters may take when the scale is estimated
 _STRETCH = 0.02  # most that the common edge may differ in length between the two charts
 
 
@@ -46,7 +45,7 @@ def stitch(
     refused = np.zeros(len(pairs), bool)
     for _ in range(min(_ROUNDS, 1 + _EFFORT // len(triangles))):
         size = _sizes(flat, chart, rim)
-        gutter = 2 * padding / _scale(size, texture_size, padding)
+        gutter = 2 * padding / expected_scale(size, texture_size, padding)
         hinges = _hinges(flat, chart, pairs, refused, size)
         chosen = _worthwhile(flat, chart, rim, hinges, size, gutter)
         if not len(chosen):
@@ -67,16 +66,6 @@ def _sizes(flat: NDArray, chart: NDArray, rim: NDArray) -> NDArray[np.float64]:
     size = np.zeros((int(chart.max()) + 1, 2))
     np.maximum.at(size, chart[rim // 3], flat[rim // 3, rim % 3])
     return size
-
-
-def _scale(size: NDArray, texture_size: int, padding: int) -> float:
-    """Texels per unit at which boxes and gutters fill the texture: sum of (w s + 2 p) (h s + 2 p) = fill * size^2."""
-    a, b = float(size.prod(1).sum()), 2 * padding * float(size.sum())
-    c = 4 * padding**2 * len(size) - _FILL * texture_size**2
-    largest = texture_size / a**0.5
-    if c >= 0:
-        return largest / 100
-    return max((-b + (b * b - 4 * a * c) ** 0.5) / (2 * a), largest / 100)
 
 
 def _hinges(flat: NDArray, chart: NDArray, pairs: NDArray, refused: NDArray, size: NDArray) -> _Hinges:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from stages.prep import charts, xatlas_worker
 from stages.prep.normals import face_normals
 from stages.prep.overlap import overlapping
-from stages.prep.pack import Packing, pack
+from stages.prep.pack import Packing, affordable_padding, pack
 from stages.prep.stitch import stitch
 from stages.prep.topology import face_components, renumber
 from stages.prep.uv import signed_area, uv_vertices
@@ -38,24 +38,26 @@ class Layout:
 
 
 def unwrap(
-    vertices: NDArray, triangles: NDArray, polygon: NDArray, texture_size: int, padding: int, seconds: float
+    vertices: NDArray, triangles: NDArray, polygon: NDArray, texture_size: int, padding: int | None, seconds: float
 ) -> Layout:
     """UVs for a mesh that has none.
 
     Args:
-        vertices: (V, 3) world. triangles: (F, 3). polygon: (F,) source face of each. texture_size, padding: texels.
-        seconds: what xatlas may take; 0 does without it.
+        vertices: (V, 3) world. triangles: (F, 3). polygon: (F,) source face of each. texture_size, padding: texels; None: as
+            wide as costs little. seconds: what xatlas may take; 0 does without it.
     """
     polygon = renumber(polygon)
     made, method = run_xatlas(vertices, triangles, seconds) if seconds > 0 else (None, "projection: the mesh is large")
     if made is not None:
         flat, chart = _whole_polygons(vertices, triangles, polygon, *made)
         flat = _to_scale(vertices[triangles], flat, chart)
+        padding = affordable_padding(flat, chart, texture_size) if padding is None else padding
         layout = _lay_out(vertices, triangles, polygon, flat, chart, texture_size, padding, method)
         if np.abs(signed_area(layout.uv)).sum() > _POOR:
             return layout
     chart = charts.grow(vertices, triangles, polygon)
     flat = charts.project(vertices, triangles, chart)
+    padding = affordable_padding(flat, chart, texture_size) if padding is None else padding
     if made is None:
         return _lay_out(vertices, triangles, polygon, flat, chart, texture_size, padding, method)
     method = "projection: denser than xatlas's many charts"
@@ -80,11 +82,17 @@ def _merit(layout: Layout) -> tuple[int, float]:
     return layout.packing.gutter, layout.packing.texels_per_unit
 
 
-def run_xatlas(vertices: NDArray, triangles: NDArray, seconds: float) -> tuple[tuple[NDArray, NDArray] | None, str]:
-    """Charts by xatlas in a process of its own: ((F, 3, 2) in units of length, (F,) chart or -1) or None, and how."""
+def run_xatlas(
+    vertices: NDArray, triangles: NDArray, seconds: float, sheet: tuple[int, int] = (256, 0)
+) -> tuple[tuple[NDArray, NDArray] | None, str]:
+    """Charts by xatlas in a process of its own: ((F, 3, 2) in units of length, (F,) chart or -1) or None, and how.
+
+    Args:
+        sheet: width and padding, texels, of xatlas's own packing, which costs next to nothing at the default.
+    """
     header = np.array([len(vertices), len(triangles)], np.int64)
     request = header.tobytes() + vertices.astype(np.float32).tobytes() + triangles.astype(np.uint32).tobytes()
-    command = [sys.executable, xatlas_worker.__file__]
+    command = [sys.executable, xatlas_worker.__file__, *map(str, sheet)]
     try:
         answer = subprocess.run(command, input=request, timeout=seconds, check=True, capture_output=True).stdout
     except subprocess.TimeoutExpired:

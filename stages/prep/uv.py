@@ -54,6 +54,23 @@ def signed_area(uv: NDArray) -> NDArray[np.float64]:
     return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
 
 
+def stretch(corners: NDArray, uv: NDArray) -> float:
+    """How unevenly the texture lies on the surface: 1 where all texels are squares of one size, more elsewhere.
+
+    Source: Sander et al. 2001, "Texture Mapping Progressive Meshes", L2 stretch, times its value at one scale.
+
+    Args:
+        corners: (F, 3, 3) in space. uv: (F, 3, 2). Triangles without area in either are left out.
+    """
+    (e1, e2), (u1, u2) = ((x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]) for x in (corners.astype(np.float64), uv.astype(np.float64)))
+    area, twice = np.linalg.norm(np.cross(e1, e2), axis=1) / 2, u1[:, 0] * u2[:, 1] - u1[:, 1] * u2[:, 0]
+    used = (area > 0) & (twice != 0)
+    e1, e2, u1, u2, area, twice = (x[used] for x in (e1, e2, u1, u2, area, twice))
+    along_u, along_v = e1 * u2[:, 1:] - e2 * u1[:, 1:], e2 * u1[:, :1] - e1 * u2[:, :1]
+    squared = ((along_u**2).sum(1) + (along_v**2).sum(1)) / (2 * twice**2)
+    return float(np.sqrt((area * squared).sum() * np.abs(twice).sum() / 2) / area.sum()) if len(area) else 1.0
+
+
 def overlap(uv: NDArray) -> float:
     """Share of covered texels that more than one face covers; 1 when no texel is covered at all."""
     cover = coverage(uv.astype(np.float64) * _RASTER, _RASTER, _RASTER)

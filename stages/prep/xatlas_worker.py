@@ -1,7 +1,8 @@
 """xatlas in a process of its own, so that a time limit, or a crash in it, cannot take the program along.
 
-Run by its path; needs nothing of this package. stdin: V and F as int64, vertices (V, 3) float32, triangles (F, 3)
-uint32. stdout: UVs (F, 3, 2) float32 in units of length, then the chart (F,) int32 of each face, -1 for none.
+Run by its path, with the width of xatlas's own sheet and its padding in texels; needs nothing of this package. stdin: V and
+F as int64, vertices (V, 3) float32, triangles (F, 3) uint32. stdout: UVs (F, 3, 2) float32 in units of length, then the chart
+(F,) int32 of each face, -1 for none.
 """
 
 import os
@@ -9,8 +10,6 @@ import sys
 
 import numpy as np
 import xatlas
-
-_TEXELS = 256.0  # xatlas packs what it makes; at this size and without gutters that costs next to nothing
 
 
 def main() -> None:
@@ -25,7 +24,8 @@ def main() -> None:
     atlas = xatlas.Atlas()
     atlas.add_mesh(vertices, triangles)
     pack = xatlas.PackOptions()
-    pack.padding, pack.resolution, pack.bilinear, pack.rotate_charts = 0, int(_TEXELS), False, False
+    pack.resolution, pack.padding = map(int, sys.argv[1:])
+    pack.bilinear, pack.rotate_charts = False, pack.padding > 0
     atlas.generate(xatlas.ChartOptions(), pack)
     _, corners, uv = atlas.get_mesh(0)
     sheet, chart = atlas.get_mesh_vertex_assignment(0)

@@ -39,6 +39,30 @@ class PriorReportOptions:
 
 
 @dataclass(frozen=True)
+class OcclusionReportOptions:
+    """Options of the occlusion report."""
+
+    size: int = 2048
+    """of the texture, texels along each edge"""
+    texels: int = 1000
+    """that are compared with float64"""
+    rays: tuple[int, ...] = (16, 128, 1280)
+    """of each point, one measurement for each"""
+    seed: int = 0
+    """of the choice of texels"""
+
+
+@dataclass(frozen=True)
+class UnwrapReportOptions:
+    """Options of the report on a texture layout."""
+
+    gutter: int = 8
+    """least texels between xatlas's charts, where the mesh's UVs were its own"""
+    seconds: float = 600.0
+    """that xatlas may take"""
+
+
+@dataclass(frozen=True)
 class TransferReportOptions:
     """Options of the report on a texture transfer."""
 

@@ -235,3 +235,11 @@ def test_texture_transform_turns_as_three_js_does() -> None:
     matrix = uv_matrix({"offset": [0.5, 0.25], "rotation": np.pi / 2, "scale": [2, 3]})
     np.testing.assert_allclose(matrix @ [1, 0, 1], [0.5, -1.75], atol=1e-12)
     np.testing.assert_allclose(matrix @ [0, 1, 1], [3.5, 0.25], atol=1e-12)
+
+
+def test_a_sources_own_occlusion_goes_before_the_baked_one(tmp_path: Path) -> None:
+    built, source, _ = everything(tmp_path)
+    look = Look({"albedo": b"", "orm": b""}, occlusion=True, passed_on=PassedOn.of(prepared(built, tmp_path)))
+    own = look.material("skin")["occlusionTexture"]
+    assert (own["index"] > 1, own["strength"]) == (True, source["occlusionTexture"]["strength"])
+    assert look.material("other")["occlusionTexture"] == {"index": 1}

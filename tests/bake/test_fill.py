@@ -20,7 +20,7 @@ def test_padding_gives_every_texel_the_nearest_chart() -> None:
     on_chart[40:50, 20:30] = on_chart[60:64, 90:100] = True
     maps = np.zeros((96, 128, 2), "f4")
     maps[40:50, 20:30], maps[60:64, 90:100] = (1, 0), (0, 1)
-    pad(maps, on_chart)
+    pad(on_chart, maps)
     y, x = np.mgrid[:96, :128]
 
     def distance(top: int, bottom: int, left: int, right: int) -> np.ndarray:
@@ -35,7 +35,7 @@ def test_padding_gives_every_texel_the_nearest_chart() -> None:
 
 def test_padding_without_any_chart_changes_nothing() -> None:
     maps = np.zeros((4, 4, 1), "f4")
-    pad(maps, np.zeros((4, 4), bool))
+    pad(np.zeros((4, 4), bool), maps)
     assert (maps == 0).all()
 
 

@@ -32,17 +32,23 @@ from tests.bake.examples import (
 )
 from tests.conftest import Golden
 
-SMALL = BakeOptions(size=512, supersample=1, preview_size=32)
+SMALL = BakeOptions(size=512, supersample=1, preview_size=32, occlusion_rays=16)
 MATERIAL = (0.6, 0.3, 0.05, 0.35, 0.8)
 
 
 @pytest.fixture
 def no_preview(monkeypatch: pytest.MonkeyPatch) -> None:
-    """For tests that look at other files: a blank preview."""
+    """For tests that look at other files: a blank preview and an empty report."""
+
+    def blank(out: Path, *args: object) -> str:
+        (out / "report.html").write_text("")
+        return "report.html"
+
     monkeypatch.setattr(stage, "contact_sheet", lambda *args: np.zeros((4, 4, 3), np.float32))
+    monkeypatch.setattr(stage, "report_page", blank)
 
 
-TEXTURES = {"albedo.exr", "roughness.exr", "metallic.exr", "albedo.png", "orm.png"}
+TEXTURES = {"albedo.exr", "roughness.exr", "metallic.exr", "occlusion.exr", "albedo.png", "orm.png"}
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +65,7 @@ def test_all_files_are_there_and_the_manifest_knows_their_hashes(constant_asset:
     folder = constant_asset / "asset"
     provenance, files = read_manifest(folder, ASSET)
     obj = {"roughness.png", "metallic.png", "model.obj", "model.mtl"}
-    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png"}
+    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png", "report.html"}
     assert all(sha256_file(folder / name) == digest for name, digest in files.items())
     assert {path.name for path in folder.iterdir()} == {*files, "bake.json", "run.json"}
     assert provenance.inputs["prep"] == sha256_file(constant_asset / "prep.npz")
@@ -293,13 +299,21 @@ def test_bilinear_look_up_at_centres_between_them_and_beyond() -> None:
     np.testing.assert_allclose(bilinear(maps, uv)[:, 0], [0, 3, 1.5, 0, 0.5], atol=1e-6)
 
 
+def test_the_report_says_what_the_asset_is(constant_asset: Path) -> None:
+    page = (constant_asset / "asset" / "report.html").read_text()
+    for said in ("a thing", "thing.obj", "12 triangles", "512 × 512 texels", "made new"):
+        assert said in page
+    for name in read_manifest(constant_asset / "asset", ASSET)[1]:
+        assert name == "report.html" or sha256_file(constant_asset / "asset" / name) in page
+
+
 def test_golden_bake(tmp_path: Path, golden: Golden) -> None:
     """A cube with a varied material, seen from above; every eighth texel, and the preview."""
     prep = save_prep(tmp_path / "prep.npz", cube())
     material = save_material(tmp_path / "material.npz", prep, small_residual())
     result = bake(prep, material, tmp_path / "asset", BakeOptions(size=512, supersample=2, preview_size=32))
     folder = result.folder
-    channels = {name: read_exr(folder / f"{name}.exr").channels for name in ("albedo", "roughness", "metallic")}
+    channels = {name: read_exr(folder / f"{name}.exr").channels for name in ("albedo", "roughness", "metallic", "occlusion")}
     arrays = {f"{name}_{c}": pixels[::8, ::8] for name, pixel in channels.items() for c, pixels in pixel.items()}
     arrays["shares"] = np.array([result.report["coverage"], result.report["unseen"]])
     golden.check("bake/cube_maps", arrays, atol=6e-4)  # one step of a half float near 1 where the last float differs

@@ -1,0 +1,68 @@
+"""The folder that `bake` wrote, opened for a reader: its manifest checked, its model read, its name made safe."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from stages.asset.read_glb import Look, TexturedModel, read_model
+from stages.core.artifact import Provenance, read_manifest, sha256_file
+from stages.core.errors import ArtifactError
+from stages.core.schemas import ASSET
+
+MODEL = "model.glb"
+
+
+@dataclass(frozen=True)
+class Asset:
+    """A baked asset. name: of the source, in letters, digits and underscores. sha256: of its manifest."""
+
+    folder: Path
+    name: str
+    provenance: Provenance
+    model: TexturedModel
+    sha256: str
+
+    def stems(self) -> list[tuple[str, Look]]:
+        """The distinct sets of pictures, each under a file stem of its own; all slots share one in most assets."""
+        distinct: list[Look] = []
+        for look in self.model.looks:
+            if all(look.pictures != other.pictures for other in distinct):
+                distinct.append(look)
+        if len(distinct) == 1:
+            return [(self.name, distinct[0])]
+        names = unique([identifier(look.name) for look in distinct])
+        return [(f"{self.name}_{name}", look) for name, look in zip(names, distinct, strict=True)]
+
+    def stem_of(self, look: Look) -> str:
+        """The stem of a material's pictures."""
+        return next(stem for stem, other in self.stems() if other.pictures == look.pictures)
+
+
+def read_asset(folder: Path) -> Asset:
+    """Open an asset folder. Raises: ArtifactError that names the file and what to do."""
+    if folder.is_dir() and not (folder / ASSET.manifest).exists():
+        raise ArtifactError(f"{folder}: holds no {ASSET.manifest}; expected a folder that `dreammat bake` wrote")
+    provenance, files = read_manifest(folder, ASSET)
+    if sha256_file(folder / MODEL) != files.get(MODEL):
+        raise ArtifactError(f"{folder / MODEL}: not the file that {ASSET.manifest} lists; bake the asset again")
+    name = identifier(Path(str(provenance.extra.get("source_name", "asset"))).stem)
+    return Asset(folder, name, provenance, read_model(folder / MODEL), sha256_file(folder / ASSET.manifest))
+
+
+def identifier(name: str) -> str:
+    """A name as every target takes it: letters, digits and underscores, the first one no digit."""
+    safe = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "asset"
+    return f"_{safe}" if safe[0].isdigit() else safe
+
+
+def unique(names: list[str]) -> list[str]:
+    """The same names, a number behind each that came before (whatever its case: some file systems know none)."""
+    taken: set[str] = set()
+    result = []
+    for name in names:
+        number, candidate = 2, name
+        while candidate.lower() in taken:
+            number, candidate = number + 1, f"{name}_{number}"
+        taken.add(candidate.lower())
+        result.append(candidate)
+    return result

@@ -1,0 +1,212 @@
+"""model.glb read back: the geometry, the materials and the very pictures that every other format is written from.
+
+A baked asset's GLB holds all that leaves the program, so an exporter needs no other file. Only what our own writer makes
+is read: one buffer, accessors without gaps, pictures inside.
+"""
+
+import json
+import struct
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from stages.core.artifact import reason, written_atomically
+from stages.core.errors import ArtifactError, one_line
+
+COMPONENTS = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+SUFFIXES = {"image/png": ".png", "image/jpeg": ".jpg"}
+
+OPAQUE = 255
+
+
+@dataclass(frozen=True)
+class Picture:
+    """An embedded picture: its row in the file's images, its encoded bytes, and ".png" or ".jpg"."""
+
+    row: int
+    data: bytes
+    suffix: str
+
+    def pixels(self) -> NDArray:
+        """As stored, uint8 or uint16, (H, W, C). Raises: ArtifactError."""
+        exact = oiio.ImageSpec()
+        exact["oiio:UnassociatedAlpha"] = 1
+        with tempfile.TemporaryDirectory() as folder:  # OpenImageIO's Python reads no memory
+            path = Path(folder) / f"picture{self.suffix}"
+            path.write_bytes(self.data)
+            source = oiio.ImageInput.open(str(path), exact)
+            values = source.read_image("unknown") if source else None
+        if values is None:
+            said = oiio.geterror() if source is None else source.geterror()
+            raise ArtifactError(f"model.glb: its picture {self.row} cannot be read ({said.strip()}); bake it again")
+        return values
+
+
+@dataclass(frozen=True)
+class Look:
+    """A material of the model.
+
+    pictures: of "albedo", "orm", "normal", "occlusion", "emission", those that it has. normal_scale: glTF's. emissive:
+    the factor on the picture.
+    """
+
+    name: str
+    double_sided: bool
+    pictures: dict[str, Picture]
+    normal_scale: float = 1.0
+    emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def packed(self) -> NDArray[np.uint8]:
+        """R occlusion (1 where there is none), G roughness, B metallic: (H, W, 3)."""
+        orm = eight_bit(self.pictures["orm"].pixels())[..., :3].copy()
+        orm[..., 0] = OPAQUE
+        if "occlusion" in self.pictures:
+            own = eight_bit(self.pictures["occlusion"].pixels())[..., :1]
+            orm[..., 0] = resized(own, orm.shape[1], orm.shape[0])[..., 0]
+        return orm
+
+    def scaled_normal(self) -> NDArray:
+        """The normal map with its scale worked in, +Y: (H, W, 3), uint8 or uint16 as stored."""
+        stored = self.pictures["normal"].pixels()[..., :3]
+        if self.normal_scale == 1:
+            return stored
+        full = np.iinfo(stored.dtype).max
+        n = (stored.astype(np.float32) / full * 2 - 1) * np.array([self.normal_scale, self.normal_scale, 1], np.float32)
+        n /= np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), np.float32(1e-6))
+        return ((n + 1) / 2 * full + np.float32(0.5)).astype(stored.dtype)
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """Triangles of one material. positions, normals: (N, 3); normals None means flat. uv: (N, 2), v down.
+
+    tangents: (N, 4) or None. triangles: (T, 3). look: index into `Model.looks`.
+    """
+
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32] | None
+    tangents: NDArray[np.float32] | None
+    uv: NDArray[np.float32]
+    triangles: NDArray[np.uint32]
+    look: int
+
+
+@dataclass(frozen=True)
+class Node:
+    """A mesh where it stands. matrix: (4, 4) local to the scene, +y up, metres."""
+
+    name: str
+    matrix: NDArray[np.float64]
+    primitives: list[Primitive]
+
+
+@dataclass(frozen=True)
+class TexturedModel:
+    """What model.glb holds. pictures: all of them, row by row. root: its JSON; chunk: its binary part."""
+
+    nodes: list[Node]
+    looks: list[Look]
+    pictures: list[Picture]
+    root: dict[str, Any] = field(repr=False, default_factory=dict)
+    chunk: bytes = field(repr=False, default=b"")
+
+
+def resized(pixels: NDArray[np.uint8], width: int, height: int) -> NDArray[np.uint8]:
+    """A picture (H, W, C) at another size, by area when smaller; itself where it has that size."""
+    if pixels.shape[:2] == (height, width):
+        return pixels
+    source = oiio.ImageBuf(np.ascontiguousarray(pixels))
+    shrinks = height < pixels.shape[0]
+    roi = oiio.ROI(0, width, 0, height, 0, 1, 0, pixels.shape[2])
+    made = oiio.ImageBufAlgo.resize(source, filtername="box" if shrinks else "triangle", roi=roi)
+    return np.asarray(made.get_pixels(oiio.UINT8)).reshape(height, width, pixels.shape[2])
+
+
+def eight_bit(pixels: NDArray) -> NDArray[np.uint8]:
+    """uint8 of uint8 or uint16, rounded to nearest."""
+    return pixels if pixels.dtype == np.uint8 else ((pixels.astype(np.uint32) + 128) // 257).astype(np.uint8)
+
+
+def read_model(path: Path) -> TexturedModel:
+    """Read a GLB that `bake` wrote. Raises: ArtifactError."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise ArtifactError(f"{path}: {reason(error)}; bake the asset again") from error
+    try:
+        root, chunk = _chunks(data)
+        views = [chunk[v.get("byteOffset", 0) :][: v["byteLength"]] for v in root["bufferViews"]]
+        arrays = [_array(entry, views) for entry in root["accessors"]]
+        pictures = [_picture(row, image, views) for row, image in enumerate(root["images"])]
+        looks = [_look(material, root["textures"], pictures) for material in root["materials"]]
+        meshes = [[_primitive(p, arrays) for p in mesh["primitives"]] for mesh in root["meshes"]]
+        roots = root["scenes"][root.get("scene", 0)]["nodes"]
+        nodes = [node for index in roots for node in _nodes(root["nodes"], index, np.eye(4), meshes)]
+    except (KeyError, ValueError, IndexError, TypeError, struct.error) as error:
+        raise ArtifactError(f"{path}: not a model that bake wrote ({one_line(error)}); bake the asset again") from error
+    return TexturedModel(nodes, looks, pictures, root, chunk)
+
+
+def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
+    magic, version, length = struct.unpack_from("<4sII", data)
+    size, kind = struct.unpack_from("<I4s", data, 12)
+    if (magic, version, length, kind) != (b"glTF", 2, len(data), b"JSON"):
+        raise ValueError("no GLB header")
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
+
+
+def _array(entry: dict[str, Any], views: list[bytes]) -> NDArray:
+    width, start = WIDTHS[entry["type"]], entry.get("byteOffset", 0)
+    values = np.frombuffer(views[entry["bufferView"]], COMPONENTS[entry["componentType"]], entry["count"] * width, start)
+    return values.reshape(-1, width)
+
+
+def _picture(row: int, image: dict[str, Any], views: list[bytes]) -> Picture:
+    return Picture(row, bytes(views[image["bufferView"]]), SUFFIXES[image["mimeType"]])
+
+
+def _look(material: dict[str, Any], textures: list[dict[str, Any]], pictures: list[Picture]) -> Look:
+    pbr = material["pbrMetallicRoughness"]
+    slots = {
+        "albedo": pbr["baseColorTexture"],
+        "orm": pbr["metallicRoughnessTexture"],
+        "normal": material.get("normalTexture"),
+        "occlusion": material.get("occlusionTexture"),
+        "emission": material.get("emissiveTexture"),
+    }
+    found = {name: pictures[textures[slot["index"]]["source"]] for name, slot in slots.items() if slot is not None}
+    red, green, blue = material.get("emissiveFactor", (0.0, 0.0, 0.0))
+    scale = float(slots["normal"].get("scale", 1.0)) if slots["normal"] else 1.0
+    return Look(material.get("name", "material"), bool(material.get("doubleSided")), found, scale, (red, green, blue))
+
+
+def _primitive(primitive: dict[str, Any], arrays: list[NDArray]) -> Primitive:
+    named = {name: arrays[index] for name, index in primitive["attributes"].items()}
+    triangles = arrays[primitive["indices"]].reshape(-1, 3).astype(np.uint32)
+    optional = named.get("NORMAL"), named.get("TANGENT")
+    return Primitive(named["POSITION"], *optional, named["TEXCOORD_0"], triangles, primitive["material"])
+
+
+def _nodes(nodes: list[dict[str, Any]], index: int, above: NDArray, meshes: list[list[Primitive]]) -> list[Node]:
+    """The meshes of a node and of all below it, each with its matrix in the scene."""
+    node = nodes[index]
+    matrix = above @ np.reshape(node.get("matrix", np.eye(4)), (4, 4)).T  # stored column by column
+    own = [Node(node.get("name", "mesh"), matrix, meshes[node["mesh"]])] if "mesh" in node else []
+    return own + [n for child in node.get("children", []) for n in _nodes(nodes, child, matrix, meshes)]
+
+
+def write_chunks(path: Path, root: dict[str, Any], chunk: bytes) -> None:
+    """Write a GLB of a JSON and a binary part, atomically."""
+    text = json.dumps(root, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    chunk += b"\0" * (-len(chunk) % 4)
+    with written_atomically(path) as temporary, open(temporary, "wb") as stream:
+        stream.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(chunk)))
+        stream.write(struct.pack("<I4s", len(text), b"JSON") + text)
+        stream.write(struct.pack("<I4s", len(chunk), b"BIN\0") + chunk)

@@ -1,0 +1,151 @@
+"""report.html of a baked asset: what `bake` knows of it, gathered for `stages.asset.report_page`."""
+
+import functools
+import importlib.metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.asset.report_page import Page, PageView, Shot, write_page
+from stages.asset.report_view import PageLight
+from stages.bake.checks import checks
+from stages.bake.preview import BACKDROP, EXPOSURE, FOV_Y, GROUND, VIEWS, backdrop, camera, draw_view
+from stages.bake.raster import Surface
+from stages.core.artifact import Artifact
+from stages.core.color import srgb_encode
+from stages.core.progress import Progress
+from stages.light.environment import Environment, directions_of_texels
+from stages.light.lights import BUILTIN, direction, disc, gradient, panel, preview_light
+from stages.light.prefilter import cosine_harmonics, mip_levels, split_lamp
+from stages.light.scene import Scene
+
+LIGHT_ROWS = 128
+"""Of the lights that are made here."""
+
+SUSPECTS = 2
+"""Lights of distillation, the first ones, whose trace is looked for in the albedo."""
+
+SHOT_VIEWS = ((35.0, 16.0), (205.0, 24.0))
+"""Azimuth and elevation of the pictures, degrees."""
+
+PACKAGES = ("dreammat", "numpy", "torch", "embreex", "xatlas", "OpenImageIO")
+"""Whose versions the page names."""
+
+LICENCES = [
+    "The textures are yours. Geometry, and UVs where they were kept, stay under the licence of the source mesh.",
+    "dreammat is Apache-2.0. Its prior learnt from pictures that the project renders itself; the vectors by which it reads "
+    "words come from all-MiniLM-L6-v2 (Apache-2.0) and WordNet 3.1 (WordNet licence).",
+]
+
+SD_LICENCE = "Distilled with Stable Diffusion: the licence of the weights that were given applies to what they made."
+
+
+@functools.cache
+def dusk() -> Environment:
+    """A red sun on the horizon under a deep blue sky."""
+    w = directions_of_texels(LIGHT_ROWS, 2 * LIGHT_ROWS)[0]
+    sun = direction(20, 6)
+    light = gradient(w, (0.05, 0.04, 0.05), (0.55, 0.32, 0.22), (0.05, 0.08, 0.22), 0.4)
+    glow = np.exp(-np.degrees(np.arccos((w @ sun).clip(-1, 1))) / 16.0)[..., None] * np.array([2.2, 0.9, 0.35])
+    lamp = disc(w, sun, 1.4, 1.0)[..., None] * np.array([520.0, 210.0, 80.0])
+    return Environment("dusk", (light + glow + lamp).astype(np.float32))
+
+
+@functools.cache
+def softbox() -> Environment:
+    """A dark room with one large soft light at the side and a weak one behind."""
+    w = directions_of_texels(LIGHT_ROWS, 2 * LIGHT_ROWS)[0]
+    light = np.full((*w.shape[:2], 3), 0.04)
+    light = light + panel(w, direction(75, 40), 1.6, 1.6, 0.1)[..., None] * np.array([4.2, 4.2, 4.2])
+    light = light + panel(w, direction(-130, 20), 0.4, 1.4, 0.1)[..., None] * np.array([2.2, 2.5, 3.0])
+    return Environment("softbox", light.astype(np.float32))
+
+
+def report_page(
+    out: Path, mesh: Artifact, made: Artifact, scene: Scene, touched: Surface, maps: NDArray[np.float32],
+    files: list[str], said: dict[str, Any], size: int, progress: Progress,
+) -> str:  # fmt: skip
+    """Write report.html. Args: said: what bake.json says. size: pixels of a picture. Returns: the file's name."""
+    progress("report", 0, 1)
+    source = str(said["source_name"])
+    lights = suspects(tuple(made.provenance.extra["environments"]))
+    page = Page(
+        name=Path(source).stem,
+        prompt=str(said["prompt"] or ""),
+        meta=f"{source}, {len(mesh['triangles']):,} triangles, {len(maps)} × {len(maps)} texels",
+        checks=checks(mesh, maps, touched, scene, lights, said),
+        shots=pictures(scene, mesh["uv"], maps, max(32, 4 * size // 5 // 2 * 2)),
+        facts=facts(mesh, made, said, len(maps)),
+        licences=[*LICENCES, *([SD_LICENCE] if str(said["guidance"].get("name")) == "sd" else [])],
+        light=page_light(),
+        view=first_view(scene),
+    )
+    write_page(out / "report.html", page, files)
+    progress("report", 1, 1)
+    return "report.html"
+
+
+def pictures(scene: Scene, uv: NDArray[np.float32], maps: NDArray[np.float32], size: int) -> list[Shot]:
+    """The asset from two sides under lights that nothing was trained on; the view in 3-D has a third one, preview.png's."""
+    shots = []
+    used = scene.vertices[np.unique(scene.triangles)].astype(np.float64)
+    for light in (dusk(), softbox()):
+        for azimuth, elevation in SHOT_VIEWS:
+            picture, _ = draw_view(scene, light, uv, maps, camera(used, azimuth, elevation), size)
+            caption = f"{light.name.capitalize()}, {'front' if azimuth < 90 else 'back'}"
+            shots.append(Shot(caption, srgb_encode(picture.over(backdrop(size)))))
+    return shots
+
+
+@functools.cache
+def suspects(names: tuple[str, ...]) -> list[Environment]:
+    """The first lights of distillation, as far as they are the project's own."""
+    known = [BUILTIN[name]() for name in names if name in BUILTIN]
+    return known[:SUSPECTS] or [BUILTIN["overcast"]()]
+
+
+@functools.cache
+def page_light() -> PageLight:
+    """preview.png's light for a rasteriser."""
+    rest, lamp = split_lamp(preview_light().radiance)
+    harmonics = cosine_harmonics(rest)
+    return PageLight(mip_levels(rest), harmonics, lamp.towards, lamp.power, lamp.spread, EXPOSURE)
+
+
+def first_view(scene: Scene) -> PageView:
+    """The first view of preview.png, at the distance from which the object fills the picture from any side."""
+    used = scene.vertices[np.unique(scene.triangles)].astype(np.float64)
+    azimuth, elevation = VIEWS[1]
+    distances = [np.linalg.norm(camera(used, a, e)[:3, 3] - (used.min(0) + used.max(0)) / 2) for a, e in VIEWS]
+    return PageView(azimuth, elevation, float(FOV_Y), float(max(distances)), (GROUND, BACKDROP))
+
+
+def facts(mesh: Artifact, made: Artifact, said: dict[str, Any], size: int) -> dict[str, str]:
+    """How the asset was made, in words."""
+    guidance = dict(said["guidance"])
+    name = str(guidance.pop("name", ""))
+    found = {key: value for key, value in said["findings"].items() if isinstance(value, int | float) and value}
+    options = {**mesh.provenance.options, **made.provenance.options}
+    chosen = ("quality", "steps", "views", "up", "uv", "padding", "texture_size", "crease_angle")
+    return {
+        "Prompt": str(said["prompt"] or "none"),
+        "Seed": str(made.provenance.seed),
+        "Guidance": ", ".join([name, *(f"{key} {value[:12]}" for key, value in guidance.items() if isinstance(value, str))]),
+        "Lights": ", ".join(made.provenance.extra["environments"]) or "none",
+        "UVs": "the source's own" if said["uv_kept"] else "made new",
+        "Material slots": ", ".join(slot or "(unnamed)" for slot in said["material_slots"]),
+        "Found in the mesh": ", ".join(f"{key.replace('_', ' ')} {value:,}" for key, value in found.items()) or "nothing",
+        "Options": ", ".join(f"{key.replace('_', ' ')} {options[key]}" for key in chosen if options.get(key) is not None),
+        "Made from": ", ".join(f"{role} {digest[:12]}" for role, digest in mesh.provenance.inputs.items()),
+        "Versions": ", ".join(f"{package} {version(package)}" for package in PACKAGES),
+    }
+
+
+def version(package: str) -> str:
+    """Of an installed package."""
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:  # dreammat itself, run from a source tree
+        return "(source tree)"
