@@ -165,7 +165,8 @@ def bake_maps(
     progress("padding", 0, 1)
     pad(on_chart, maps, occlusion)
     height = np.ascontiguousarray(maps[..., 5]) if learnt.recipe.has_relief else None
-    return Maps(np.ascontiguousarray(maps[..., :5]), height, occlusion=occlusion), {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
+    shares = {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
+    return Maps(np.ascontiguousarray(maps[..., :5]), height, occlusion=occlusion), shares
 
 
 def with_normals(subject: Subject, maps: Maps) -> Maps:
