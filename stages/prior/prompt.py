@@ -8,6 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from stages.core.color import srgb_decode
+from stages.material.look import to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
@@ -25,6 +27,9 @@ RGB = tuple[float, float, float]
 
 ALIKE = 0.55
 """Least cosine of two meanings for an unknown word to be taken for a substance at all."""
+
+SIMILAR = 0.2
+"""Distance in OKLab within which a named colour describes a stuff's own."""
 
 UNSAID = "plaster"
 """What a thing is taken to be made of where neither words nor tables say."""
@@ -125,9 +130,12 @@ class Reading:
         """The substance of a phrase, with the colour and finish that it asks for."""
         if phrase.unknown and (not phrase.substance or phrase.substance in GENERIC):
             return self._unknown(phrase)
-        if phrase.substance:
-            return self._of(stuff(phrase.substance, bool(phrase.colors)), phrase)
         made = OBJECTS[phrase.thing].made if phrase.thing else ""
+        if phrase.substance:
+            usual = split(made)[0] if made else Phrase()
+            if not phrase.colors and usual.substance and _family(usual) == _family(phrase):  # "a plastic traffic cone"
+                phrase = replace(phrase, colors=usual.colors)
+            return self._of(stuff(phrase.substance, bool(phrase.colors)), phrase)
         if made:
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
@@ -149,33 +157,38 @@ class Reading:
             phrase.weather = []  # "rusty" alone is rust
         return self._of(stuff(name, bool(phrase.colors)), phrase)
 
-    def _of(self, wanted: Stuff, phrase: Phrase) -> Coat:
-        """A stuff as a phrase wants it."""
+    def _of(self, wanted: Stuff, phrase: Phrase, name: str = "") -> Coat:
+        """A stuff as a phrase wants it. Args: name: what people call it, in place of the table's."""
         wanted = boards_of(wanted) if phrase.boards else wanted
         roughness = _roughness(phrase, bool(wanted.metallic)) or wanted.roughness
         for word in phrase.weather:
             roughness *= WET.get(word, 1.0)
-        color = _faded(np.array(_color(phrase, wanted.color)), phrase)
+        color = _faded(np.array(_described(wanted, _color(phrase, wanted.color))), phrase)
         look = look_of(wanted, phrase.finish, self._looks)
         metallic = wanted.metallic
         if metallic and phrase.colors and any(word in COLORS for word in phrase.colors) and wanted.look != "brushed aluminium":
             color = _triple(0.6 * np.array(_color(phrase)) + 0.4 * np.array(_color(phrase)) * np.array(wanted.color))
-        return self._sized(Coat(look, color, float(roughness), metallic, said=_said(phrase)))
+        return self._sized(Coat(look, color, float(roughness), metallic, said=f"{name} {_said(phrase)}".strip()))
 
     def _unknown(self, phrase: Phrase) -> Coat:
         """A phrase with words that no table knows: its means by the reader, its look by the nearest name."""
+        own = next((LOOK_OF[word] for word in phrase.unknown if word in LOOK_OF), "")
+        kind = self._kind_of(phrase.unknown[0])
+        if kind:  # a dictionary says no more than that it is a kind of wood, or of cloth
+            wanted = stuff(kind, bool(phrase.colors))
+            return self._of(wanted._replace(look=own or wanted.look), replace(phrase, unknown=[]), " ".join(phrase.unknown))
         words = " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance]).strip()
         *color, roughness, metallic = self._prior.read([words]).coats[0, 0].tolist()
-        metal = metallic > 0.5
-        name = self._nearest(phrase, metal)
-        near = stuff(name, False)
-        own = next((LOOK_OF[word] for word in phrase.unknown if word in LOOK_OF), "")
-        wanted = near._replace(look=own) if own else near
-        if phrase.colors:
-            color = list(_color(phrase, _triple(np.array(color))))
-        look = look_of(boards_of(wanted) if phrase.boards else wanted, phrase.finish, self._looks)
-        rough = _roughness(phrase, metal) or roughness
-        return self._sized(Coat(look, _faded(np.array(color), phrase), float(rough), float(metal), said=_said(phrase)))
+        near = stuff(self._nearest(phrase, metallic > 0.5), False)
+        read = near._replace(look=own or near.look, color=_triple(np.array(color)), roughness=roughness, metallic=float(metallic > 0.5))
+        return self._of(read._replace(paintable=True), phrase)
+
+    def _kind_of(self, word: str) -> str:
+        """The substance that a dictionary names a word by, where that is all it says of it; or ""."""
+        told = self._prior.vocabulary.explained.get(word, ())
+        families = {KNOWN[w][0].family for w in told if w in KNOWN}
+        plain = all(w in KNOWN and w not in COLORS for w in told)
+        return told[-1] if plain and len(families) == 1 and families != {"metal"} else ""
 
     def _means_material(self, word: str) -> bool:
         """Whether a word that no table knows says anything of a material."""
@@ -302,11 +315,25 @@ def _color(phrase: Phrase, own: RGB | None = None) -> RGB:
     return _triple(color)
 
 
+def _described(wanted: Stuff, named: RGB) -> RGB:
+    """A named colour as this stuff has it: "green moss" is moss."""
+    if wanted.paintable or wanted.metallic:
+        return named
+    own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
+    if float(np.linalg.norm(own - other)) > SIMILAR:
+        return named
+    return _triple(np.array(wanted.color) + 0.3 * (np.array(named) - np.array(wanted.color)))
+
+
 def _roughness(phrase: Phrase, metal: bool) -> float | None:
     """What words of finish say, if any does."""
     table = {**FINISHES, **FINISHES_METAL} if metal else {**FINISHES_METAL, **FINISHES}
     found = [sum(table[word]) / 2 for word in phrase.finish if word in table]
     return float(np.mean(found)) if found else None
+
+
+def _family(phrase: Phrase) -> str:
+    return KNOWN[phrase.substance][0].family
 
 
 def _worn(coat: Coat) -> Coat:

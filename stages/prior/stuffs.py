@@ -58,6 +58,10 @@ FINISH_LOOKS = {
 """Words of finish → the finish whose look of a metal they call for."""
 
 
+PAINTABLE = frozenset(words("ceramic, plastic, paint, fabric, leather, paper, fruit peel, wax, skin, fur, feathers, scales"))
+"""Families and looks that take any colour. Of others a colour that is like their own only describes them: "green moss"."""
+
+
 def _stuff(name: str, s: Substance) -> Stuff:
     red, green, blue = np.mean([rgb(text) for text in s.colors], 0).tolist()
     look = LOOK_OF.get(name, name)
@@ -69,7 +73,7 @@ def _extra() -> dict[str, list[Stuff]]:
     for family, look, color, roughness, names in rows("stuffs.tsv"):
         red, green, blue = rgb(color).tolist()
         for name in words(names):
-            table[name] = [Stuff(name, family, look, (red, green, blue), float(roughness), float(family == "metal"))]
+            table[name] = [Stuff(name, family, look, (red, green, blue), float(roughness), float(family == "metal"), family in PAINTABLE or look in PAINTABLE)]
     return table
 
 
