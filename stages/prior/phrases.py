@@ -29,7 +29,7 @@ FILLER = (
     "pattern", "patterned", "style", "both", "each", "that", "which", "it", "lots of", "bits of", "pieces of", "layer of",
     "a bit of", "a few", "many", "thick", "thin", "small amounts of", "around", "along", "growing", "flat shaded", "underneath",
     "on it", "all over", "everywhere", "s", "this", "their", "other", "one", "simple", "nice", "piece of", "block of", "part",
-    "piece", "parts", "set of", "pair of", "sheet of", "slab of", "lump of", "was", "were", "be", "for", "as",
+    "piece", "parts", "half-timbered", "out", "coat of", "coats of", "coating of", "splash of", "touch of", "set of", "pair of", "sheet of", "slab of", "lump of", "was", "were", "be", "for", "as",
 )  # fmt: skip
 
 
@@ -65,7 +65,8 @@ JOINS = {
     **_joins("through", "showing through, shining through, visible through, peeking through, visible under, visible beneath", True),
     **_joins("fade", "fading into, fading to, fades into, fades to, blending into, blending to, turning into, turning to, "
              "transitioning to, transitioning into, gradient to, merging into, melting into, dissolving into, changing into"),
-    **_joins("on", "on, onto, atop, upon, on a, across", True), **_joins("over", "over, on top of, applied to, laid over", True),
+    **_joins("on", "on, onto, atop, upon, across, out of, growing on, growing out of, growing from, emerging from, mounted on, "
+             "standing on, sitting on, resting on, lying on, painted on, painted onto, printed on, splashed on", True), **_joins("over", "over, on top of, applied to, laid over", True),
     **_joins("above", "above, over top", True), **_joins("below", "below, under, beneath", True),
     **_joins("of", "of"), **_joins("to", "to"), **_joins("in", "in, into, set in, set into, embedded in"),
 }  # fmt: skip
@@ -91,7 +92,8 @@ class Phrase:
 
     substance: a name of `KNOWN`. boards: sawn. colors: words that make up its colour, names of substances among them. finish:
     words. weather: of `WEATHER`, `FADED`, `WET`. unknown: words that no table knows. thing: of `OBJECTS`. animal: of `ANIMALS`.
-    region: where it lies. where: the word that said so. shows: what is beneath, where it is said. """
+    region: where it lies. where: the word that said so. placed: whether that word came last. shows: what is beneath, where
+    it is said. """
 
     join: Join = Join("")
     substance: str = ""
@@ -105,6 +107,7 @@ class Phrase:
     animal: str = ""
     region: Region | None = None
     where: str = ""
+    placed: bool = False
     shows: "Phrase | None" = None
 
     @property
@@ -140,7 +143,9 @@ def split(prompt: str, explained: Mapping[str, Sequence[str]] | None = None) -> 
         now, following = phrases[-1], tokens[number + 1] if number + 1 < len(tokens) else Token("end", "")
         join = _join_of(token, now, following)
         if join is None:
-            if token.kind in ("join", "postfix", "comma"):
+            if token.kind == "join" and token.value.kind == "peel" and "peeling" not in now.weather:
+                now.weather.append("peeling")
+            if token.kind in ("join", "postfix", "comma", "half"):
                 continue
             if _begins(token, now):
                 now = Phrase(Join("with"))
@@ -167,11 +172,15 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
         if not now.says_what and token.text in SHAPES:
             now.region, now.where = SHAPES[token.text], token.text  # "striped canvas"
             return None
+        if following.kind == "part":  # "leather-wrapped grip"
+            return None
         return Join(token.value, True) if now.says_what and not now.animal else None
     if token.kind == "half":
         return None if now.empty else Join("half")
     if token.kind != "join":
         return None
+    if token.value.kind in ("peel", "through") and following.kind in ("comma", "end", "join"):
+        return None  # "blue paint peeling off, ..."
     if token.value.kind == "of":
         return Join("of", True) if now.region and now.says_what else None
     if token.value.kind == "in":
@@ -184,19 +193,10 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
 
 
 def _begins(token: Token, now: Phrase) -> bool:
-    """Whether a token begins a phrase although no word joins it to the one before."""
+    """Whether a token begins a phrase although no word joins it to the one before: "gold rim white porcelain"."""
     if token.kind == "substance":
-        return bool((now.region and now.says_what and now.where not in ADJECTIVES) or (now.thing and now.substance))
-    if token.kind == "color":
-        return bool(now.region and now.says_what and now.where not in ADJECTIVES)
-    if token.kind == "part":
-        return bool(now.region and now.says_what and now.where in PARTS)
-    return False
-
-
-ADJECTIVES = frozenset("striped banded spotted dotted checkered chequered checked stained mottled streaked inlaid veined "
-                       "speckled flecked studded riveted splattered spattered splashed patched blotchy polka-dotted".split())  # fmt: skip
-"""Words of patterns that stand before what has them."""
+        return now.placed or bool(now.thing and now.substance)
+    return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS))
 
 
 def _take(phrase: Phrase, token: Token) -> None:
@@ -209,7 +209,7 @@ def _take(phrase: Phrase, token: Token) -> None:
         if text not in words[kind]:
             words[kind].append(text)
     elif kind in ("part", "shape") and (phrase.region is None or kind == "part"):
-        phrase.region, phrase.where = token.value, text
+        phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
     elif kind == "thing" and not phrase.thing:
         phrase.thing = text
     elif kind == "animal":
@@ -256,6 +256,8 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             before.weather += [word for word in phrase.weather if word not in before.weather]
         elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
             _describe(before, phrase)
+        elif not phrase.says_what and phrase.region and after and after.join.kind == "comma" and after.says_what and not after.region:
+            after.region, after.where, after.join = phrase.region, phrase.where, Join("with")  # "trim: copper"
         elif before and not phrase.says_what and not (phrase.weather or phrase.finish):
             _lend(before, phrase, after, result)
         else:
@@ -307,7 +309,9 @@ def _in_pairs(phrases: list[Phrase]) -> list[Phrase]:
         first, second = phrases[number], phrases[number + 1]
         if not first.color_only or first.region or second.join.kind not in ("and", "comma"):
             continue
-        if second.substance and second.where not in PARTS:
+        first.thing = first.thing or ("" if second.where in PARTS else second.thing)
+        said = second.substance and (second.colors or _family(second.substance) not in ("metal", "gem"))
+        if said and second.where not in PARTS:
             first.substance, first.boards = second.substance, second.boards
         if number and second.region and second.where in SHAPES:
             share = second.region.share
@@ -374,7 +378,7 @@ def _resolved(found: list[Token]) -> list[Token]:
         behind = _run(reversed(result))
         names = {t.kind for t in ahead} & {"substance", "thing"}
         if token.text in COLORS and token.kind in ("substance", "thing"):
-            shaped = any(t.kind in ("shape", "part") for t in ahead)
+            shaped = any(t.kind == "shape" or (t.kind == "part" and token.kind == "thing") for t in ahead)
             if names or shaped or any(t.kind == "substance" for t in behind):
                 token = Token("color", token.text)
         if token.kind == "color" and token.article and not ahead and token.text in OBJECTS:

@@ -29,6 +29,9 @@ PARTS = _table(
     ("foot, feet, legs, leg, paws, hooves, castors, casters, wheels, tyres, tires, stem, stalk", Region("below", 0.3)),
     ("top, upper half, upper part, top half, upper, upper section", Region("above", 0.5)),
     ("lid, cap, cover, roof, hood, dome, crown, crest, hat, bonnet, lids, stopper, hair, comb, mane, ceiling", Region("above", 0.22)),
+    ("lower third, bottom third, lowest third", Region("below", 0.33)), ("lower quarter, bottom quarter", Region("below", 0.25)),
+    ("upper third, top third", Region("above", 0.33)), ("upper quarter, top quarter, capital", Region("above", 0.25)),
+    ("shade, lampshade", Region("above", 0.5)),
     ("rim, lip, brim, collar, mouth, rims", Region("above", 0.06)),
     ("neck, spout, shoulders", Region("above", 0.3)),
     ("head, face, helmet, canopy, backrest, back rest, seat back, headboard", Region("above", 0.35)),
@@ -43,7 +46,7 @@ PARTS = _table(
     ("belly, underbelly, bottom side", Region("down", 0.3)),
     ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "
      "edge trim, gilding, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
-     "clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching", Region("edges", 0.1, 0.04, 0.1)),
+     "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching", Region("edges", 0.1, 0.04, 0.1)),
     ("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams, crevice, "
      "carvings, engraved lines, creases, corners inside, cavities, pits", Region("crevices", 0.22, 0.08, 0.6)),
     ("inside, interior, lining, cavity, inner side", Region("hidden", 0.3, 0.05, 0.1)),
@@ -104,7 +107,8 @@ GATHERS = {
 }  # fmt: skip
 """What gathers of itself, and where it does when nobody says."""
 
-ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt", "earth": "dirt"}
+ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt", "earth": "dirt",
+        "green patina": "verdigris", "copper patina": "verdigris", "oxidized copper": "verdigris"}
 """Other names of what gathers."""
 
 LAYERED = {"moss": 3e-3, "snow": 8e-3, "rust": 2e-4, "grass": 5e-3}
@@ -131,7 +135,7 @@ WEATHER = _weather(
     ("muddy", Weather("mud", Region("below", 0.3, 0.2, 1.0), 2e-4, 0.95)),
     ("weathered, aged, old, ancient, antique, vintage, worn out", Weather("grime", Region("crevices", 0.3, 0.15, 1.0), 0.0, 0.55)),
     ("stained, water-stained, streaky", Weather("grime", Region("streaks", 0.3, 0.14, 0.9), 0.0, 0.6)),
-    ("charred, burnt, burned, scorched, sooty", Weather("soot", Region("patches", 0.4, 0.3, 1.0), 0.0, 0.9)),
+    ("charred, burnt, burned, scorched, sooty", Weather("charcoal", Region("patches", 0.4, 0.3, 1.0), 0.0, 0.9)),
     ("tarnished", Weather("tarnish", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.8)),
     ("patinated, oxidised, oxidized", Weather("verdigris", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.85)),
     ("worn, battered, battle-worn, distressed, used, well-worn, worn-out", Weather("", Region("edges", 0.1, 0.06, 1.0), -1e-4)),
@@ -170,5 +174,5 @@ JOINED = {
 }  # fmt: skip
 """Where a phrase lies that only its joining word tells."""
 
-PEELED = Mask("chips", 0.35, 0.14, 0.9, invert=True)
-"""What is left of a coat that peels."""
+PEELED, WHOLE = Mask("chips", 0.35, 0.14, 0.9, invert=True), Mask("chips", 0.06, 0.1, 0.9, invert=True)
+"""What is left of a coat that peels, and of one that is nearly whole."""

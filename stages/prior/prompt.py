@@ -5,6 +5,7 @@ same tables and explains other words by a dictionary, and look like the substanc
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -18,10 +19,10 @@ from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Join, Phrase, split
 from stages.prior.places import (
-    ANIMALS, FADED, GATHERS, JOINED, LAYERED, ONCE, PEELED, PEELS, SHOWS, TABLE_PARTS, TABLES, WEATHER, WET, Region,
+    ANIMALS, FADED, GATHERS, JOINED, LAYERED, ONCE, PARTS, PEELED, PEELS, TABLE_PARTS, TABLES, WEATHER, WET, WHOLE, Region,
 )  # fmt: skip
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
-from stages.prior.stuffs import GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
+from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
 
 RGB = tuple[float, float, float]
 
@@ -30,6 +31,9 @@ ALIKE = 0.55
 
 SIMILAR = 0.2
 """Distance in OKLab within which a named colour describes a stuff's own."""
+
+COATINGS = frozenset("plaster|stucco|enamel|gold leaf|gold foil|varnish|glaze|lacquer|black lacquer|wallpaper|gilding".split("|"))
+"""Thin coats that are no paint."""
 
 UNSAID = "plaster"
 """What a thing is taken to be made of where neither words nor tables say."""
@@ -51,7 +55,7 @@ class Reading:
         rest, said = measured(prompt)
         phrases = split(rest, self._prior.vocabulary.explained)
         self._metres = self._metres or said or _usual_size(phrases)
-        base, over = _ordered(phrases, self._known(phrases))
+        base, over = _ordered(self._known(phrases))
         layers = self._base_layers(base)
         coat = layers.pop(0).coat
         for phrase in over:
@@ -69,7 +73,7 @@ class Reading:
         """The base's coat, as a layer, and what lies on it of itself: its weather, an animal's marks, a thing's own parts."""
         made = split(OBJECTS[base.thing].made) if base.thing and not (base.substance or base.unknown or base.animal) else []
         if len(made) > 1 and not base.colors:
-            inner, over = _ordered(made, made)
+            inner, over = _ordered(made)
             inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
             coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
             parts = [layer for phrase in over for layer in self._over(phrase, coat)]
@@ -81,8 +85,6 @@ class Reading:
             if not base.colors:
                 layers = [Layer(replace(coat, color=_triple(rgb(ground))))]
             layers.append(Layer(replace(coat, color=_triple(rgb(marks)), said=f"{base.animal} marks"), (region.mask(base.animal),)))
-        elif base.where and base.region and base.color_only and base.region.kind in ("stripes", "checks", "spots"):
-            pass
         return [*layers, *self._weather(base)]
 
     def _over(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
@@ -91,15 +93,17 @@ class Reading:
             return self._more(phrase, beneath)
         coat = self._coat(phrase, beneath)
         peels = [word for word in phrase.weather if word in PEELS]
-        if phrase.region is None and (phrase.join.kind == "peel" or (peels and phrase.join.kind in ("with", "over", "and"))):
+        if phrase.region is None and (phrase.join.kind == "peel" or (peels and phrase.join.kind in ("with", "over", "and", "comma", "on"))):
             rest = replace(phrase, weather=[word for word in phrase.weather if word not in PEELS])
-            return [Layer(coat, (PEELED,), 2e-4), *self._weather(rest, (PEELED,))]
+            return [Layer(coat, (PEELED,), 2e-4), *self._weather(rest, (PEELED,), beneath)]
+        if phrase.region is None and phrase.join.kind in ("on", "over") and _coats(phrase):
+            return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (), beneath)]
         if phrase.animal:
             _, marks, region = ANIMALS[phrase.animal]
             marked = replace(beneath, color=_color(phrase) if phrase.colors else _triple(rgb(marks)), said=_said(phrase))
             return [Layer(marked, (region.mask(phrase.animal),))]
         mask = self._region(phrase).mask(phrase.where)
-        return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,))]
+        return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,), beneath)]
 
     def _more(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
         """A part of which only finish or wear is said: "polished edges", "dirty cracks"."""
@@ -133,7 +137,8 @@ class Reading:
         made = OBJECTS[phrase.thing].made if phrase.thing else ""
         if phrase.substance:
             usual = split(made)[0] if made else Phrase()
-            if not phrase.colors and usual.substance and _family(usual) == _family(phrase):  # "a plastic traffic cone"
+            same = usual.substance == phrase.substance or (phrase.substance in GENERIC and usual.substance and _family(usual) == _family(phrase))
+            if not phrase.colors and same:  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
             return self._of(stuff(phrase.substance, bool(phrase.colors)), phrase)
         if made:
@@ -144,7 +149,9 @@ class Reading:
                 inner.substance = "paint"
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
         if beneath is not None and phrase.colors:  # of the same stuff
-            look = "paint" if beneath.metallic and phrase.region else beneath.look
+            kind = phrase.region.kind if phrase.region else JOINED.get(phrase.join.kind, JOINED["with"]).kind
+            painted = _family_of(beneath.look) in ("metal", "rust", "wood", "stone") and kind not in ("veins", "spots", "patches")
+            look = "paint" if painted or beneath.metallic else beneath.look
             metallic = 0.0 if look == "paint" else beneath.metallic
             rough = _roughness(phrase, bool(metallic)) or (0.35 if look == "paint" else beneath.roughness)
             look = look_of(stuff("paint", True), available=self._looks) if look == "paint" else look
@@ -213,12 +220,12 @@ class Reading:
         length = float(np.linalg.norm(total))
         return total / length if length > 0 else total
 
-    def _weather(self, phrase: Phrase, where: tuple[Mask, ...] = ()) -> list[Layer]:
-        """What words of wear and weather lay over a phrase's coat."""
+    def _weather(self, phrase: Phrase, where: tuple[Mask, ...] = (), under: Coat | None = None) -> list[Layer]:
+        """What words of wear and weather lay over a phrase's coat. Args: under: what shows where it is worn, if that is known."""
         layers = []
         for word in _weathers(phrase):
             weather = WEATHER[word]
-            coat = self._named(weather.stuff) if weather.stuff else self._beneath(phrase)
+            coat = self._named(weather.stuff) if weather.stuff else self._beneath(phrase, under)
             mask = weather.region.mask(word)
             if not weather.stuff and phrase.shows and phrase.shows.region:
                 mask = phrase.shows.region.mask(phrase.shows.where)
@@ -229,10 +236,12 @@ class Reading:
         """What weather leaves: dust, dirt and their like."""
         return self._of(stuff(name, False), Phrase(substance=name))
 
-    def _beneath(self, phrase: Phrase) -> Coat:
+    def _beneath(self, phrase: Phrase, under: Coat | None) -> Coat:
         """What shows where a coat is worn through."""
         if phrase.shows:
             return self._coat(phrase.shows)
+        if under and _coats(phrase):
+            return under
         own = self._coat(phrase)
         family = KNOWN[phrase.substance][0].family if phrase.substance else ""
         if family == "paint" or own.look in ("paint", "car paint", "painted wood"):
@@ -243,17 +252,19 @@ class Reading:
         return replace(coat, metres=self._metres or METRES.get(coat.look, 1.0))
 
 
-def _ordered(said: list[Phrase], known: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
+def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
     """The base, and what lies over it from below: "spots on tan", "paint peeling off wood" name the upper one first."""
-    phrases, _ = list(known), said
-    base = next((k for k in range(len(phrases) - 1, 0, -1) if all(p.join.beneath for p in phrases[1 : k + 1])), 0)
-    for k in range(base, 0, -1):
-        phrases[k - 1] = replace(phrases[k - 1], join=Join(phrases[k].join.kind))
-    over = [*reversed(phrases[:base]), *phrases[base + 1 :]]
-    first = phrases[base]
-    if base and not (first.substance or first.colors or first.unknown or first.animal or OBJECTS.get(first.thing)):
-        first = replace(first, thing=first.thing)
-    return _placed(first, over)
+    base = 0
+    while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
+        base += 1
+    upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in zip(phrases, phrases[1 : base + 1], strict=False)]
+    return _placed(phrases[base], [*reversed(upper), *phrases[base + 1 :]])
+
+
+def _stands(first: Phrase, second: Phrase) -> bool:
+    """Whether a thing stands on its own part, "a dragon on a wooden base", rather than a stuff on what is beneath."""
+    part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
+    return part and not first.region and first.substance not in GATHERS
 
 
 def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
@@ -264,14 +275,22 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
         alone = bool(thing) and not (first.substance or first.colors or first.unknown)
         first, over = over[body], [*([] if alone else [first]), *over[:body], *over[body + 1 :]]
         first = replace(first, thing=first.thing or (thing if alone else ""))
-    bare = bool(first.thing) and not (first.substance or first.colors or first.unknown or first.animal)
+    told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
+    bare = bool(first.thing) and not (told or first.substance or first.colors or first.unknown or first.animal)
     if bare and over and over[0].region is None and over[0].says_what and _covers(over[0]):
         first, over = replace(over[0], thing=first.thing, join=Join(""), weather=[*first.weather, *over[0].weather]), over[1:]
     if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
         over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
+    if over and over[0].region and first.region and {over[0].region.kind, first.region.kind} == {"above", "below"} and over[0].where in ("above", "below"):
+        over[0] = replace(over[0], region=over[0].region._replace(share=1 - first.region.share))
     if first.thing in TABLES:
         over = [replace(p, region=TABLE_PARTS.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
     return first, over
+
+
+def _coats(phrase: Phrase) -> bool:
+    """Whether it is a thin coat on something."""
+    return bool(phrase.substance) and (_family(phrase) == "paint" or phrase.substance in COATINGS)
 
 
 def _covers(phrase: Phrase) -> bool:
@@ -330,6 +349,13 @@ def _roughness(phrase: Phrase, metal: bool) -> float | None:
     table = {**FINISHES, **FINISHES_METAL} if metal else {**FINISHES_METAL, **FINISHES}
     found = [sum(table[word]) / 2 for word in phrase.finish if word in table]
     return float(np.mean(found)) if found else None
+
+
+@cache
+def _family_of(look: str) -> str:
+    """The family of the stuffs that have a look, or one of its finishes."""
+    found = (s.family for stuffs in KNOWN.values() for s in stuffs if look in (s.look, s.look.split(" ")[-1]))
+    return next(found, "metal" if look.split(" ")[0] in FINISH_LOOKS else "")
 
 
 def _family(phrase: Phrase) -> str:
