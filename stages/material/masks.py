@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.material.directions import WHOLE, Pieces, along
-from stages.material.patterns import Spectrum, edge, exceeds, fbm, lost, noise, spots, warped
+from stages.material.patterns import Spectrum, cells, edge, exceeds, fbm, lost, noise, spots, warped
 from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
 from stages.material.surface import Array, Surface
@@ -91,18 +91,21 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
     return fbm(bent, _chance(mask), 7)
 
 
+TURN = np.array([[0.8, 0.36, 0.48], [-0.6, 0.48, 0.64], [0.0, -0.8, 0.6]], np.float32)
+"""A rotation, so that veins run aslant."""
+
+
 def _veins(mask: Mask, at: Place) -> Array:
-    """Minus the distance to the nearest vein, about, object sizes: branching lines, where warped noise crosses zero, thinner
-    the finer they are."""
+    """Minus the distance to the nearest vein, about, object sizes: long ones where stretched noise crosses zero, and branches
+    from them along the borders of cells, which taper off."""
     size = mask.size
-    bent = warped(at, 0.18 * size, 0.6 * size, 3, 4)
-    nearest = np.full(len(at), -size, np.float32)
-    for octave, (wide, slope) in enumerate(((size, 1.0), (0.45 * size, 2.2), (0.2 * size, 5.0))):
-        # noise of deviation 1 and wavelength w rises by about 4 / w: |noise| w / 4 is the distance to where it is zero
-        away = abs(noise(bent, wide, 11 + octave)) * np.float32(0.25 * wide)
-        fade = np.float32(0.04 * size) * np.maximum(noise(at, 1.6 * size, 21 + octave), 0)  # no vein runs on for ever
-        nearest = np.maximum(nearest, -(away * np.float32(slope) + fade))
-    return nearest
+    bent = warped(at.moved(TURN @ at.p), 0.08 * size, 0.7 * size, 3, 5)
+    # noise of deviation 1 and wavelength w rises by about 4 / w: |noise| w / 4 is the distance to where it is zero
+    long = abs(noise(bent, 1.2 * size, 11, (4, 1, 4))) * np.float32(0.3 * size)
+    vary = 1 + 0.5 * np.clip(noise(at, 0.5 * size, 12), -1.4, 2)  # thick and thin
+    branch, twig = (cells(bent, share * size, seed).border for share, seed in ((0.9, 13), (0.35, 14)))
+    near = np.minimum(long * vary, 1.8 * branch + 0.1 * long)
+    return -np.minimum(near, 4 * twig + 0.5 * near + np.float32(0.003 * size)).astype(np.float32)
 
 
 def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:

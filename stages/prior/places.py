@@ -72,7 +72,7 @@ SHAPES = _table(
      Region("patches", 0.35, 0.16, 0.7)),
     ("streaks, drips, runs, streaked, drippings, dripping", Region("streaks", 0.2, 0.12, 0.8)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
-    ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks of, lines, kintsugi, lightning", Region("veins", 0.09, 0.3)),
+    ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks of, lines, kintsugi, lightning", Region("veins", 0.06, 0.22)),
 )  # fmt: skip
 """Patterns in which one thing lies on another."""
 
