@@ -9,12 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from stages.material.directions import WHOLE, Pieces, along
-from stages.material.patterns import Spectrum, edge, exceeds, fbm, lost, noise, spots, warped
+from stages.material.patterns import Spectrum, cells, edge, exceeds, fbm, lost, noise, spots, warped
 from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
 from stages.material.surface import Array, Surface
 
-DISTANCES = ("below", "above", "front", "back", "stripes", "bands", "spots", "checks")
+SIDES = ("below", "above", "front", "back", "left", "right", "fade")
+"""Kinds that cover a share of the extent, not of the surface."""
+
+DISTANCES = (*SIDES, "stripes", "bands", "spots", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
 
 CHANCE = ("patches", "streaks", "scratches", "chips")
@@ -39,6 +42,9 @@ def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
         ragged = 0.12 * mask.wear * mask.size
         if mask.wear:
             value = value + ragged * fbm(at, rough, 5)
+        if mask.kind == "fade":  # the border is as wide as the mask's size, and mottled
+            mottled = 0.12 * mask.size * fbm(at, Spectrum(0.5 * mask.size, mask.size / 64, 0.7), 5)
+            return edge(value + mottled - level, np.maximum(mask.size, at.footprint))
         soft = np.maximum(0.5 * at.footprint, 1.2 * ragged * lost(at, rough)) if mask.wear else 0.5 * at.footprint
         return edge(value - level, 2 * soft)
     if mask.kind in CHANCE:
@@ -57,8 +63,8 @@ def _chance(mask: Mask) -> Spectrum:
 def signal(mask: Mask, surface: Surface, at: Place) -> Array:
     """The field of a mask, (P,): larger where the layer lies."""
     x, y, z = at.p
-    if mask.kind in ("below", "above", "front", "back"):
-        return {"below": -z, "above": z, "front": x, "back": -x}[mask.kind]
+    if mask.kind in SIDES:
+        return {"below": -z, "above": z, "fade": z, "front": x, "back": -x, "left": y, "right": -y}[mask.kind]
     if mask.kind in ("edges", "crevices"):
         return surface.convexity if mask.kind == "edges" else np.maximum(-surface.convexity, 0.8 * surface.occlusion - 0.2)
     if mask.kind in ("up", "down"):
@@ -76,11 +82,30 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
     if mask.kind == "spots":
         bent = warped(at, 0.05 * mask.size * (0.3 + mask.wear), 0.5 * mask.size, 3)
         return spots(bent, mask.size, (0.22 * mask.size, 0.42 * mask.size), 1.0, 4).inside
+    if mask.kind == "veins":
+        return _veins(mask, at)
     if mask.kind == "chips":
         strength = 0.8 * noise(at, 3 * mask.size, 9) + 1.4 * np.clip(surface.convexity, -0.3, 0.6)
         return fbm(at, _chance(mask), 7) + strength
     bent = warped(at, 0.3 * mask.size, mask.size, 3) if mask.kind == "patches" else at
     return fbm(bent, _chance(mask), 7)
+
+
+TURN = np.array([[0.8, 0.36, 0.48], [-0.6, 0.48, 0.64], [0.0, -0.8, 0.6]], np.float32)
+"""A rotation, so that veins run aslant."""
+
+
+def _veins(mask: Mask, at: Place) -> Array:
+    """Minus the distance to the nearest vein, about, object sizes: long ones where stretched noise crosses zero, and branches
+    from them along the borders of cells, which taper off."""
+    size = mask.size
+    bent = warped(at.moved(TURN @ at.p), 0.08 * size, 0.7 * size, 3, 5)
+    # noise of deviation 1 and wavelength w rises by about 4 / w: |noise| w / 4 is the distance to where it is zero
+    long = abs(noise(bent, 1.2 * size, 11, (4, 1, 4))) * np.float32(0.3 * size)
+    vary = 1 + 0.5 * np.clip(noise(at, 0.5 * size, 12), -1.4, 2)  # thick and thin
+    branch, twig = (cells(bent, share * size, seed).border for share, seed in ((0.9, 13), (0.35, 14)))
+    near = np.minimum(long * vary, 1.8 * branch + 0.1 * long)
+    return -np.minimum(near, 4 * twig + 0.5 * near + np.float32(0.003 * size)).astype(np.float32)
 
 
 def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
@@ -94,7 +119,7 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
             return mask
         value = signal(mask, surface, place)
         share = 1 - mask.share if mask.invert else mask.share
-        if mask.kind in ("below", "above", "front", "back"):  # a share of the extent, not of the area
+        if mask.kind in SIDES:  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())
             return replace(mask, level=high - share * (high - low))
         return replace(mask, level=float(np.quantile(value, 1 - np.clip(share, 0, 1))))

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 KINDS = (
-    "all", "below", "above", "front", "back", "edges", "crevices", "up", "down", "hidden",
-    "spots", "stripes", "bands", "checks", "patches", "streaks", "scratches", "chips",
+    "all", "below", "above", "front", "back", "left", "right", "fade", "edges", "crevices", "up", "down", "hidden",
+    "spots", "stripes", "bands", "checks", "veins", "patches", "streaks", "scratches", "chips",
 )  # fmt: skip
 """Ways to say where a layer lies; see `masks.py`."""
 
@@ -36,9 +36,10 @@ class Coat:
 
 @dataclass(frozen=True)
 class Mask:
-    """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the height for "below" and "above". size: of its
+    """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the extent for heights and sides. size: of its
     shapes or of its border's noise, as a share of the object. wear: 0 a border as sharp as paint … 1 a ragged one. invert:
-    everywhere else. level: threshold of what the mask is made of, once settled; None before. """
+    everywhere else. level: threshold of what the mask is made of, once settled; None before. said: the word that asked for
+    it, for people. """
 
     kind: str = "all"
     share: float = 0.3
@@ -46,6 +47,7 @@ class Mask:
     wear: float = 0.5
     invert: bool = False
     level: float | None = None
+    said: str = ""
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,11 @@ def named(name: str) -> NDArray[np.float64]:
     if name in COLORS:
         return rgb(COLORS[name])
     word, base = name.split(" ", 1)
-    color = named(base)
+    return changed(named(base), word)
+
+
+def changed(color: NDArray[np.float64], word: str) -> NDArray[np.float64]:
+    """sRGB (3,) of a colour under a word of `CHANGES` or `LEANINGS`."""
     if word in LEANINGS:
         return color + LEAN * (rgb(COLORS[LEANINGS[word]]) - color)
     saturation, lightness, white = CHANGES[word]

@@ -6,54 +6,74 @@ from stages.material.recipe import Mask
 
 
 class Region(NamedTuple):
-    """kind, share: of a mask. sharp: parts end where they end; weather does not."""
+    """kind, share, size, wear: of a mask. Parts end where they end; weather does not."""
 
     kind: str
     share: float
     size: float = 0.05
     wear: float = 0.0
 
-    def mask(self) -> Mask:
-        return Mask(self.kind, self.share, self.size, self.wear)
+    def mask(self, said: str = "") -> Mask:
+        return Mask(self.kind, self.share, self.size, self.wear, said=said)
 
 
-def _table(text: str, region: Region) -> dict[str, Region]:
-    return {word.strip(): region for word in text.split(",")}
+def _table(*entries: tuple[str, Region]) -> dict[str, Region]:
+    return {word.strip(): region for text, region in entries for word in text.split(",")}
 
 
-PARTS: dict[str, Region] = {
-    **_table("sole, soles, outsole, tread, treads", Region("below", 0.08)),
-    **_table("base, bottom, foot, feet, pedestal, plinth, stand, underside, lower half, lower part, bottom half", Region("below", 0.5)),
-    **_table("plinth, pedestal, stand, socle, foundation, hem", Region("below", 0.22)),
-    **_table("foot, feet, legs, leg, paws, hooves, castors, wheels, tyres, tires", Region("below", 0.3)),
-    **_table("top, upper half, upper part, top half, upper", Region("above", 0.5)),
-    **_table("lid, cap, cover, roof, hood, dome, crown, crest, hat, bonnet", Region("above", 0.22)),
-    **_table("rim, lip, brim, collar, mouth", Region("above", 0.06)),
-    **_table("neck, spout", Region("above", 0.3)),
-    **_table("head, face, helmet, canopy, backrest, back rest, seat back", Region("above", 0.35)),
-    **_table("seat, cushion, cushions, tabletop, table top, shelf", Region("up", 0.3)),
-    **_table("tip, point, spire, finial, tips", Region("above", 0.1)),
-    **_table("blade", Region("above", 0.7)), **_table("handle, grip, hilt, haft, pommel, shaft", Region("below", 0.3)),
-    **_table("front, front side, fascia, door", Region("front", 0.3)), **_table("back side, rear, reverse", Region("back", 0.3)),
-    **_table("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, rims, corners, outline, accents, "
-             "edge trim, gilding, highlights", Region("edges", 0.1, 0.04, 0.1)),
-    **_table("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams",
-             Region("crevices", 0.22, 0.08, 0.6)),
-    **_table("inside, interior, lining, cavity", Region("hidden", 0.3, 0.05, 0.1)),
-}  # fmt: skip
+PARTS = _table(
+    ("body, bodies, walls, sides, main body, hull, bodywork, exterior, outside, background, ground, rest", Region("all", 1.0)),
+    ("base, bottom, underside, lower half, lower part, bottom half, lower, lower section", Region("below", 0.5)),
+    ("sole, soles, outsole, tread, treads, rubber sole", Region("below", 0.08)),
+    ("pedestal, plinth, stand, socle, foundation, foundations, hem, skirting", Region("below", 0.2)),
+    ("foot, feet, legs, leg, paws, hooves, castors, casters, wheels, tyres, tires, stem, stalk", Region("below", 0.3)),
+    ("top, upper half, upper part, top half, upper, upper section", Region("above", 0.5)),
+    ("lid, cap, cover, roof, hood, dome, crown, crest, hat, bonnet, lids, stopper, hair, comb, mane, ceiling", Region("above", 0.22)),
+    ("lower third, bottom third, lowest third", Region("below", 0.33)), ("lower quarter, bottom quarter", Region("below", 0.25)),
+    ("upper third, top third", Region("above", 0.33)), ("upper quarter, top quarter, capital", Region("above", 0.25)),
+    ("shade, lampshade", Region("above", 0.5)),
+    ("rim, lip, brim, collar, mouth, rims", Region("above", 0.06)),
+    ("neck, spout, shoulders", Region("above", 0.3)),
+    ("head, face, helmet, canopy, backrest, back rest, seat back, headboard", Region("above", 0.35)),
+    ("seat, cushion, cushions, tabletop, table top, shelf, shelves, upholstery, desktop, countertop", Region("up", 0.3)),
+    ("tip, point, spire, finial, tips, horns, antlers, knob", Region("above", 0.1)),
+    ("blade, blades, barrel of it", Region("above", 0.7)),
+    ("handle, grip, hilt, haft, pommel, shaft, handles, handlebar, stock", Region("below", 0.3)),
+    ("front, front side, fascia, door, front half, screen, windows, window, windshield, chest plate", Region("front", 0.3)),
+    ("beak, nose, snout, eyes, nozzle", Region("front", 0.1)),
+    ("back side, rear, reverse, back half, tail, backside", Region("back", 0.3)),
+    ("left half, left side, left", Region("left", 0.5)), ("right half, right side, right", Region("right", 0.5)),
+    ("belly, underbelly, bottom side", Region("down", 0.3)),
+    ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "
+     "edge trim, gilding, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
+     "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching", Region("edges", 0.1, 0.04, 0.1)),
+    ("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams, crevice, "
+     "carvings, engraved lines, creases, corners inside, cavities, pits", Region("crevices", 0.22, 0.08, 0.6)),
+    ("inside, interior, lining, cavity, inner side", Region("hidden", 0.3, 0.05, 0.1)),
+)
 """Parts of things that name a region."""
 
-SHAPES: dict[str, Region] = {
-    **_table("stripes, stripe, striped, pinstripes", Region("stripes", 0.5, 0.14)),
-    **_table("bands, band, hoops, rings, ring, straps, belts, banded", Region("bands", 0.3, 0.22)),
-    **_table("spots, spot, dots, polka dots, polka, spotted, dotted, speckles, freckles, flecks", Region("spots", 0.3, 0.14)),
-    **_table("checks, checkered, chequered, checkerboard, squares, check, checked", Region("checks", 0.5, 0.12)),
-    **_table("patches, patch, stains, stained, splotches, blotches, areas, camouflage, marbling, swirls, mottled, splashes, "
-             "splatters", Region("patches", 0.35, 0.16, 0.7)),
-    **_table("streaks, drips, runs, streaked", Region("streaks", 0.2, 0.12, 0.8)),
-    **_table("scratches", Region("scratches", 0.06, 0.1, 0.8)),
-    **_table("inlay, inlays, inlaid, veins, filigree, lines", Region("bands", 0.16, 0.2)),
-}  # fmt: skip
+TABLES = frozenset("table desk bench stool chair nightstand dresser cabinet sideboard".split())
+TABLE_PARTS = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat": Region("up", 0.3)}
+"""Parts of furniture, which lie elsewhere than in other things."""
+
+SHAPES = _table(
+    ("stripes, stripe, striped, pinstripes, vertical stripes, diagonal stripes, racing stripes, racing stripe",
+     Region("stripes", 0.5, 0.14)),
+    ("bands, band, hoops, rings, ring, straps, strap, belts, belt, banded, horizontal stripes, horizontal bands, banding, sash",
+     Region("bands", 0.3, 0.22)),
+    ("spots, spot, dots, polka dots, polka, spotted, dotted, speckles, freckles, flecks, speckled, flecked, polka-dotted",
+     Region("spots", 0.3, 0.14)),
+    ("studs, rivets, buttons, knobs, bolts, nails, studded, riveted", Region("spots", 0.06, 0.07)),
+    ("checks, checkered, chequered, checkerboard, squares, check, checked, check pattern, chessboard pattern",
+     Region("checks", 0.5, 0.12)),
+    ("patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, mottled, splashes, splatters, splattered, "
+     "spattered, splashed, patched, blotchy, smudges, smears, puddles, flames, graffiti, spills",
+     Region("patches", 0.35, 0.16, 0.7)),
+    ("streaks, drips, runs, streaked, drippings, dripping", Region("streaks", 0.2, 0.12, 0.8)),
+    ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
+    ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks of, lines, kintsugi, lightning", Region("veins", 0.06, 0.22)),
+)  # fmt: skip
 """Patterns in which one thing lies on another."""
 
 ANIMALS = {
@@ -62,9 +82,10 @@ ANIMALS = {
     "jaguar": ("#bf8c48", "#1f140c", Region("spots", 0.38, 0.13, 0.8)),
     "zebra": ("#ece8e0", "#161514", Region("stripes", 0.5, 0.12, 0.6)),
     "tiger": ("#cf7a28", "#1a120c", Region("stripes", 0.35, 0.16, 0.7)),
-    "giraffe": ("#a8682f", "#e0c898", Region("crevices", 0.2, 0.1)),
+    "giraffe": ("#a8682f", "#e0c898", Region("veins", 0.2, 0.2)),
     "cow": ("#ece8e2", "#1b1918", Region("patches", 0.4, 0.3, 0.1)),
     "dalmatian": ("#efece6", "#151414", Region("spots", 0.25, 0.12, 0.3)),
+    "panda": ("#ece8e0", "#161514", Region("patches", 0.4, 0.4, 0.1)),
     "ladybird": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
     "ladybug": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
     "camouflage": ("#5a5c3a", "#3a3324", Region("patches", 0.45, 0.2, 0.2)),
@@ -72,36 +93,86 @@ ANIMALS = {
 }
 """Coats that everybody knows: ground, marks, and how these lie."""
 
+GATHERS = {
+    "moss": Region("crevices", 0.4, 0.18, 1.0), "rust": Region("chips", 0.4, 0.12, 1.0), "dirt": Region("crevices", 0.35, 0.15, 1.0),
+    "mud": Region("below", 0.25, 0.15, 1.0), "soil": Region("crevices", 0.35, 0.15, 1.0), "snow": Region("up", 0.42, 0.12, 0.4),
+    "verdigris": Region("crevices", 0.35, 0.14, 1.0), "frost": Region("edges", 0.35, 0.1, 1.0), "ice": Region("up", 0.3, 0.15, 0.6),
+    "lichen": Region("patches", 0.25, 0.1, 1.0), "gold leaf": Region("patches", 0.5, 0.25, 0.8), "ash": Region("up", 0.45, 0.2, 1.0),
+    "soot": Region("patches", 0.4, 0.3, 1.0), "dust": Region("up", 0.5, 0.2, 1.0), "sand": Region("up", 0.4, 0.2, 1.0),
+    "ivy": Region("patches", 0.5, 0.2, 0.8), "leaves": Region("patches", 0.5, 0.12, 0.8), "algae": Region("below", 0.4, 0.15, 1.0),
+    "icing": Region("above", 0.45, 0.1, 0.6), "frosting": Region("above", 0.45, 0.1, 0.6), "icing sugar": Region("up", 0.45, 0.15, 1.0),
+    "cobwebs": Region("crevices", 0.25, 0.12, 1.0), "grime": Region("crevices", 0.35, 0.15, 1.0),
+    "barnacles": Region("below", 0.4, 0.1, 1.0), "patina": Region("crevices", 0.35, 0.14, 1.0), "vines": Region("patches", 0.4, 0.15, 0.9),
+    "whipped cream": Region("above", 0.4, 0.1, 0.6), "blood": Region("patches", 0.3, 0.18, 0.8), "grass": Region("up", 0.45, 0.1, 0.8),
+}  # fmt: skip
+"""What gathers of itself, and where it does when nobody says."""
+
+ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt", "earth": "dirt",
+        "green patina": "verdigris", "copper patina": "verdigris", "oxidized copper": "verdigris"}
+"""Other names of what gathers."""
+
+LAYERED = {"moss": 3e-3, "snow": 8e-3, "rust": 2e-4, "grass": 5e-3}
+"""Looks that stand proud of what is beneath, metres."""
+
 
 class Weather(NamedTuple):
-    """What a word of wear or weather lays over a thing. substance: words for it, "" where what is beneath shows. regions:
-    where. thickness: metres. strength: most that it covers. """
+    """What a word of wear or weather lays over a thing. stuff: its name, "" where what is beneath shows. region: where.
+    thickness: metres. strength: most that it covers. """
 
-    substance: str
-    regions: tuple[Region, ...]
+    stuff: str
+    region: Region
     thickness: float = 0.0
     strength: float = 1.0
 
 
-WEATHER: dict[str, Weather] = {
-    **dict.fromkeys(("rusty", "rusted", "rusting", "corroded"), Weather("rust", (Region("chips", 0.42, 0.12, 1.0),), 2e-4)),
-    **dict.fromkeys(("dusty", "sandy"), Weather("dust", (Region("up", 0.5, 0.2, 1.0),), 1e-4, 0.6)),
-    **dict.fromkeys(("dirty", "grimy", "muddy", "filthy", "soiled"), Weather("dirt", (Region("crevices", 0.4, 0.15, 1.0),), 1e-4, 0.85)),
-    **dict.fromkeys(("mossy", "overgrown"), Weather("moss", (Region("crevices", 0.42, 0.18, 1.0),), 3e-3)),
-    **dict.fromkeys(("snowy", "snow-covered", "snow-capped", "frosted over", "frosty"), Weather("snow", (Region("up", 0.42, 0.12, 0.4),), 8e-3)),
-    **dict.fromkeys(("worn", "battered", "battle-worn", "distressed", "used", "chipped edges"), Weather("", (Region("edges", 0.1, 0.06, 1.0),), -1e-4)),
-    **dict.fromkeys(("chipped", "peeling", "flaking", "flaky", "crackled paint"), Weather("", (Region("chips", 0.2, 0.08, 0.9),), -2e-4)),
-    **dict.fromkeys(("scratched", "scuffed", "scraped"), Weather("", (Region("scratches", 0.05, 0.1, 0.9),), -5e-5)),
-    **dict.fromkeys(("stained", "water-stained", "streaked"), Weather("grime", (Region("streaks", 0.3, 0.14, 0.9),), 0.0, 0.6)),
-    **dict.fromkeys(("charred", "burnt", "burned", "scorched"), Weather("soot", (Region("patches", 0.4, 0.3, 1.0),), 0.0, 0.9)),
-    **dict.fromkeys(("tarnished", "patinated", "oxidised", "oxidized"), Weather("tarnish", (Region("crevices", 0.4, 0.15, 0.9),), 0.0, 0.8)),
-    **dict.fromkeys(("weathered", "aged", "old", "ancient", "antique", "vintage", "worn out"),
-                    Weather("grime", (Region("crevices", 0.3, 0.15, 1.0),), 0.0, 0.55)),
-}  # fmt: skip
-"""Words of wear and weather."""
+def _weather(*entries: tuple[str, Weather]) -> dict[str, Weather]:
+    return {word.strip(): weather for text, weather in entries for word in text.split(",")}
+
+
+WEATHER = _weather(
+    ("rusty, rusted, rusting, corroded", Weather("rust", Region("chips", 0.42, 0.12, 1.0), 2e-4)),
+    ("dirty, grimy, filthy, soiled", Weather("dirt", Region("crevices", 0.4, 0.15, 1.0), 1e-4, 0.85)),
+    ("muddy", Weather("mud", Region("below", 0.3, 0.2, 1.0), 2e-4, 0.95)),
+    ("weathered, aged, old, ancient, antique, vintage, worn out", Weather("grime", Region("crevices", 0.3, 0.15, 1.0), 0.0, 0.55)),
+    ("stained, water-stained, streaky", Weather("grime", Region("streaks", 0.3, 0.14, 0.9), 0.0, 0.6)),
+    ("charred, burnt, burned, scorched, sooty", Weather("charcoal", Region("patches", 0.4, 0.3, 1.0), 0.0, 0.9)),
+    ("tarnished", Weather("tarnish", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.8)),
+    ("patinated, oxidised, oxidized", Weather("verdigris", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.85)),
+    ("worn, battered, battle-worn, distressed, used, well-worn, worn-out", Weather("", Region("edges", 0.1, 0.06, 1.0), -1e-4)),
+    ("chipped, peeling, flaking, flaky, flaked, peeled", Weather("", Region("chips", 0.2, 0.08, 0.9), -2e-4)),
+    ("scratched, scuffed, scraped", Weather("", Region("scratches", 0.05, 0.1, 0.9), -5e-5)),
+    ("mossy, overgrown", Weather("moss", Region("crevices", 0.42, 0.18, 1.0), 3e-3)),
+    ("bloody, bloodstained, blood-stained", Weather("blood", Region("patches", 0.25, 0.18, 0.9))),
+    ("dusty, sandy", Weather("dust", Region("up", 0.5, 0.2, 1.0), 1e-4, 0.6)),
+    ("frosty, frosted over, icy", Weather("frost", Region("edges", 0.35, 0.1, 1.0), 1e-3, 0.85)),
+    ("snowy", Weather("snow", Region("up", 0.42, 0.12, 0.4), 8e-3)),
+)
+"""Words of wear and weather, from below: what lies lowest first."""
+
+SHOWS = frozenset(word for word, weather in WEATHER.items() if not weather.stuff)
+"""Those that let show what is beneath."""
+
+PEELS = frozenset("peeling flaking flaky flaked peeled chipped".split())
+"""Those that leave only parts of a coat."""
 
 FADED = {"weathered": 0.85, "aged": 0.9, "old": 0.95, "faded": 0.7, "bleached": 0.6, "sun-bleached": 0.6, "vintage": 0.92}
 """Words that take colour out: factor of the saturation."""
 
 WET = {"wet": 0.35, "damp": 0.6, "oily": 0.45, "slimy": 0.35}
 """Words of wetness: factor of the roughness."""
+
+COVERED = Region("patches", 0.75, 0.3, 0.6)
+PARTLY = Region("patches", 0.35, 0.2, 0.7)
+FADE = Region("fade", 0.5, 0.6)
+JOINED = {
+    "cover": COVERED, "partly": PARTLY, "spots": Region("spots", 0.3, 0.14), "inlay": SHAPES["inlay"], "edge": PARTS["trim"],
+    "stripe": SHAPES["stripes"], "band": SHAPES["bands"], "with": PARTLY, "and": PARTLY, "comma": PARTLY, "on": PARTLY, "of": PARTLY,
+    "over": COVERED, "above": Region("above", 0.5), "below": Region("below", 0.5), "check": SHAPES["checks"], "patch": SHAPES["patches"],
+    "streak": SHAPES["streaks"], "vein": SHAPES["veins"], "cap": Region("up", 0.4, 0.12, 0.4), "rim": PARTS["rim"],
+    "tip": PARTS["tip"], "sole": PARTS["sole"], "handle": PARTS["handle"], "line": PARTS["lining"], "stud": SHAPES["studs"],
+    "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5), "bottom": PARTS["base"], "legs": PARTS["legs"],
+}  # fmt: skip
+"""Where a phrase lies that only its joining word tells."""
+
+PEELED, WHOLE = Mask("chips", 0.35, 0.14, 0.9, invert=True), Mask("chips", 0.06, 0.1, 0.9, invert=True)
+"""What is left of a coat that peels, and of one that is nearly whole."""

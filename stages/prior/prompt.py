@@ -3,33 +3,40 @@
 Words that a table knows mean what it says. Words that none knows are read by the prior's reader, which was trained on the
 same tables and explains other words by a dictionary, and look like the substance whose name means most nearly the same. """
 
+from collections.abc import Collection
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
+from stages.core.color import srgb_decode
+from stages.material.look import to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Recipe
 from stages.material.substances import LOOKS, METRES
-from stages.prior.colors import CHANGES, COLORS, LEANINGS, named, rgb
+from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
 from stages.prior.model import Prior
-from stages.prior.names import FINISHES, FINISHES_METAL, SUBSTANCES, Substance
+from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
-from stages.prior.phrases import Phrase, split
-from stages.prior.places import ANIMALS, FADED, WEATHER, WET, Region
-from stages.prior.stuffs import FAMILY_LOOKS, GATHERS, LAYERED, LOOK_OF, STUFFS
+from stages.prior.phrases import Join, Phrase, split
+from stages.prior.places import (
+    ANIMALS, FADED, GATHERS, JOINED, LAYERED, ONCE, PARTS, PEELED, PEELS, TABLE_PARTS, TABLES, WEATHER, WET, WHOLE, Region,
+)  # fmt: skip
+from stages.prior.sizes import LEAST, MOST, TIMES, measured
+from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
 
-BY_NAME = {name: substance for substance in reversed(SUBSTANCES) for name in substance.names}
+RGB = tuple[float, float, float]
 
-COVERED = Region("patches", 0.75, 0.3, 0.6)
-PARTLY = Region("patches", 0.35, 0.2, 0.7)
-JOINED = {
-    "cover": COVERED, "partly": PARTLY, "spots": Region("spots", 0.3, 0.14), "inlay": Region("bands", 0.16, 0.2),
-    "edge": Region("edges", 0.1, 0.04, 0.1), "stripe": Region("stripes", 0.5, 0.14), "band": Region("bands", 0.3, 0.22),
-    "with": PARTLY, "on": PARTLY, "above": Region("above", 0.5), "below": Region("below", 0.5),
-}  # fmt: skip
-"""Where a phrase lies that only its joining word tells."""
+ALIKE = 0.55
+"""Least cosine of two meanings for an unknown word to be taken for a substance at all."""
 
-PEELED = Mask("chips", 0.35, 0.14, 0.9, invert=True)
-"""What is left of a coat that peels."""
+SIMILAR = 0.2
+"""Distance in OKLab within which a named colour describes a stuff's own."""
+
+COATINGS = frozenset("plaster|stucco|enamel|gold leaf|gold foil|varnish|glaze|lacquer|black lacquer|wallpaper|gilding".split("|"))
+"""Thin coats that are no paint."""
+
+UNSAID = "plaster"
+"""What a thing is taken to be made of where neither words nor tables say."""
 
 
 def read_prompt(prompt: str, prior: Prior, seed: int, metres: float | None = None) -> Recipe:
@@ -38,193 +45,343 @@ def read_prompt(prompt: str, prior: Prior, seed: int, metres: float | None = Non
 
 
 class Reading:
-    """One reading of a prompt. Args: as `read_prompt`."""
+    """One reading of a prompt. Args: as `read_prompt`; looks: names of those that there are."""
 
-    def __init__(self, prior: Prior, metres: float | None = None) -> None:
-        self._prior, self._metres = prior, metres
+    def __init__(self, prior: Prior, metres: float | None = None, looks: Collection[str] = LOOKS) -> None:
+        self._prior, self._metres, self._looks = prior, metres, looks
 
     def recipe(self, prompt: str, seed: int) -> Recipe:
         """See `read_prompt`."""
-        phrases = split(prompt)
-        things = [OBJECTS[p.thing] for p in phrases if p.thing]
-        if self._metres is None and things:
-            self._metres = things[0].metres
-        base, over = _ordered(phrases)
-        coat, layers = self._coat(base), self._weather(base)
+        rest, said = measured(prompt)
+        phrases = split(rest, self._prior.vocabulary.explained)
+        self._metres = self._metres or said or _usual_size(phrases)
+        base, over = _ordered(self._known(phrases))
+        layers = self._base_layers(base)
+        coat = layers.pop(0).coat
+        for phrase in over:
+            layers += self._over(phrase, coat)
+        return Recipe(coat, tuple(_once(layers)), seed)
+
+    def _known(self, phrases: list[Phrase]) -> list[Phrase]:
+        """The phrases without words that mean no material, such as names of things that no table has."""
+        for phrase in phrases:
+            phrase.unknown = [word for word in phrase.unknown if self._means_material(word)]
+        kept = [phrase for phrase in phrases if not phrase.empty]
+        return kept or [Phrase()]
+
+    def _base_layers(self, base: Phrase) -> list[Layer]:
+        """The base's coat, as a layer, and what lies on it of itself: its weather, an animal's marks, a thing's own parts."""
+        made = split(OBJECTS[base.thing].made) if base.thing and not (base.substance or base.unknown or base.animal) else []
+        if len(made) > 1 and not base.colors:
+            inner, over = _ordered(made)
+            inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
+            coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
+            parts = [layer for phrase in over for layer in self._over(phrase, coat)]
+            return [Layer(coat), *parts, *self._weather(inner)]
+        coat = self._coat(base)
+        layers = [Layer(coat)]
         if base.animal:
             ground, marks, region = ANIMALS[base.animal]
-            coat = replace(coat, color=_triple(rgb(ground)))
-            layers.insert(0, Layer(replace(coat, color=_triple(rgb(marks))), (region.mask(),)))
-        for phrase in over:
-            layers += self._layers(phrase, coat)
-        return Recipe(coat, tuple(layers), seed)
+            if not base.colors:
+                layers = [Layer(replace(coat, color=_triple(rgb(ground))))]
+            layers.append(Layer(replace(coat, color=_triple(rgb(marks)), said=f"{base.animal} marks"), (region.mask(base.animal),)))
+        return [*layers, *self._weather(base)]
 
-    def _layers(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
+    def _over(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
         """What a phrase lays over the base."""
+        if not phrase.says_what:
+            return self._more(phrase, beneath)
         coat = self._coat(phrase, beneath)
-        if phrase.join in ("peel", "over") and phrase.region is None:
-            return [Layer(coat, (PEELED,), 2e-4)]
-        gathers = GATHERS.get(phrase.substance)
-        region = phrase.region or (gathers if gathers and phrase.join in ("with", "on", "cover") else None) or JOINED[phrase.join]
-        if gathers and phrase.join == "cover" and phrase.region is None:
-            region = gathers._replace(share=max(gathers.share, 0.65))
-        thick = LAYERED.get(coat.look, 0.0)
-        return [Layer(coat, (region.mask(),), thick), *self._weather(phrase, (region.mask(),))]
+        peels = [word for word in phrase.weather if word in PEELS]
+        if phrase.region is None and (phrase.join.kind == "peel" or (peels and phrase.join.kind in ("with", "over", "and", "comma", "on"))):
+            rest = replace(phrase, weather=[word for word in phrase.weather if word not in PEELS])
+            return [Layer(coat, (PEELED,), 2e-4), *self._weather(rest, (PEELED,), beneath)]
+        if phrase.region is None and phrase.join.kind in ("on", "over") and _coats(phrase):
+            return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (), beneath)]
+        if phrase.animal:
+            _, marks, region = ANIMALS[phrase.animal]
+            marked = replace(beneath, color=_color(phrase) if phrase.colors else _triple(rgb(marks)), said=_said(phrase))
+            return [Layer(marked, (region.mask(phrase.animal),))]
+        mask = self._region(phrase).mask(phrase.where)
+        return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,), beneath)]
+
+    def _more(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
+        """A part of which only finish or wear is said: "polished edges", "dirty cracks"."""
+        where = (phrase.region or JOINED["with"]).mask(phrase.where)
+        layers = []
+        if phrase.finish:
+            metal = (beneath.metallic or 0.0) > 0.5
+            layers = [Layer(replace(beneath, roughness=_roughness(phrase, metal) or beneath.roughness, said=_said(phrase)), (where,))]
+        for word in _weathers(phrase):
+            weather = WEATHER[word]
+            coat = self._named(weather.stuff) if weather.stuff else _worn(beneath)
+            layers.append(Layer(coat, (replace(where, wear=1.0),), weather.thickness, weather.strength))
+        return layers
+
+    def _region(self, phrase: Phrase) -> Region:
+        """Where a phrase lies."""
+        gathers = GATHERS.get(ONCE.get(phrase.substance, phrase.substance))
+        if phrase.region and gathers and phrase.region.kind == "above" and phrase.where.endswith("top"):
+            return Region("up", 0.45, gathers.size, gathers.wear)
+        if phrase.region:
+            return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region
+        if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):
+            covers = phrase.join.kind in ("cover", "over")
+            return gathers._replace(share=max(gathers.share, 0.65)) if covers and gathers.kind != "up" else gathers
+        return JOINED.get(phrase.join.kind, JOINED["with"])
 
     def _coat(self, phrase: Phrase, beneath: Coat | None = None) -> Coat:
         """The substance of a phrase, with the colour and finish that it asks for."""
+        if phrase.unknown and (not phrase.substance or phrase.substance in GENERIC):
+            return self._unknown(phrase)
         made = OBJECTS[phrase.thing].made if phrase.thing else ""
         if phrase.substance:
-            name = phrase.substance
-        elif phrase.unknown:
-            return self._unknown(phrase)
-        elif made:
+            usual = split(made)[0] if made else Phrase()
+            same = usual.substance == phrase.substance or (phrase.substance in GENERIC and usual.substance and _family(usual) == _family(phrase))
+            if not phrase.colors and same:  # "a plastic traffic cone"
+                phrase = replace(phrase, colors=usual.colors)
+            return self._of(stuff(phrase.substance, bool(phrase.colors)), phrase)
+        if made:
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
-            return self._coat(inner)
-        elif beneath is not None:  # a colour alone: of the same stuff
-            return replace(beneath, color=_color(phrase), said=_said(phrase))
-        else:
-            name = "paint" if phrase.colors else "stone"
-        substance = _chosen(name, bool(phrase.colors))
-        mean = np.array(_color(phrase)) if phrase.colors else np.mean([rgb(text) for text in substance.colors], 0)
-        finish = _finish(phrase, substance)
-        roughness = np.mean(finish or substance.roughness)
+            inner.weather, inner.region, inner.where = phrase.weather, None, ""
+            if inner.substance == "painted metal" and any(word in FINISHES_METAL for word in inner.finish):
+                inner.substance = "paint"
+            return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
+        if beneath is not None and phrase.colors:  # of the same stuff
+            kind = phrase.region.kind if phrase.region else JOINED.get(phrase.join.kind, JOINED["with"]).kind
+            painted = _family_of(beneath.look) in ("metal", "rust", "wood", "stone") and kind not in ("veins", "spots", "patches")
+            look = "paint" if painted or beneath.metallic else beneath.look
+            metallic = 0.0 if look == "paint" else beneath.metallic
+            rough = _roughness(phrase, bool(metallic)) or (0.35 if look == "paint" else beneath.roughness)
+            look = look_of(stuff("paint", True), available=self._looks) if look == "paint" else look
+            return replace(beneath, color=_color(phrase), look=look, metallic=metallic, roughness=rough, said=_said(phrase))
+        if phrase.animal:
+            return self._of(stuff("fur", False), phrase)
+        weathers = [WEATHER[word].stuff for word in _weathers(phrase) if WEATHER[word].stuff]
+        name = "paint" if phrase.colors else weathers[0] if weathers else UNSAID
+        if weathers and not phrase.colors:
+            phrase.weather = []  # "rusty" alone is rust
+        return self._of(stuff(name, bool(phrase.colors)), phrase)
+
+    def _of(self, wanted: Stuff, phrase: Phrase, name: str = "") -> Coat:
+        """A stuff as a phrase wants it. Args: name: what people call it, in place of the table's."""
+        wanted = boards_of(wanted) if phrase.boards else wanted
+        roughness = _roughness(phrase, bool(wanted.metallic)) or wanted.roughness
         for word in phrase.weather:
             roughness *= WET.get(word, 1.0)
-        look = look_of(name, substance, phrase.finish)
-        return self._sized(Coat(look, _faded(mean, phrase), float(roughness), substance.metallic, said=_said(phrase)))
+        color = _faded(np.array(_described(wanted, _color(phrase, wanted.color))), phrase)
+        look = look_of(wanted, phrase.finish, self._looks)
+        metallic = wanted.metallic
+        if metallic and phrase.colors and any(word in COLORS for word in phrase.colors) and wanted.look != "brushed aluminium":
+            color = _triple(0.6 * np.array(_color(phrase)) + 0.4 * np.array(_color(phrase)) * np.array(wanted.color))
+        return self._sized(Coat(look, color, float(roughness), metallic, said=f"{name} {_said(phrase)}".strip()))
 
     def _unknown(self, phrase: Phrase) -> Coat:
         """A phrase with words that no table knows: its means by the reader, its look by the nearest name."""
-        reading = self._prior.read([" ".join(phrase.words)])
-        *color, roughness, metallic = reading.coats[0, 0].tolist()
-        name = self._nearest(" ".join(phrase.unknown), metallic > 0.5)
-        if phrase.colors:
-            color = list(_color(phrase))
-        finish = _finish(phrase, BY_NAME[name])
-        look = look_of(name, BY_NAME[name], phrase.finish)
-        mean = _faded(np.array(color), phrase)
-        return self._sized(Coat(look, mean, float(np.mean(finish)) if finish else roughness, float(metallic > 0.5), said=_said(phrase)))
+        own = next((LOOK_OF[word] for word in phrase.unknown if word in LOOK_OF), "")
+        kind = self._kind_of(phrase.unknown[0])
+        if kind:  # a dictionary says no more than that it is a kind of wood, or of cloth
+            wanted = stuff(kind, bool(phrase.colors))
+            return self._of(wanted._replace(look=own or wanted.look), replace(phrase, unknown=[]), " ".join(phrase.unknown))
+        words = " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance]).strip()
+        *color, roughness, metallic = self._prior.read([words]).coats[0, 0].tolist()
+        near = stuff(self._nearest(phrase, metallic > 0.5), False)
+        read = near._replace(look=own or near.look, color=_triple(np.array(color)), roughness=roughness, metallic=float(metallic > 0.5))
+        return self._of(read._replace(paintable=True), phrase)
 
-    def _nearest(self, words: str, metal: bool) -> str:
+    def _kind_of(self, word: str) -> str:
+        """The substance that a dictionary names a word by, where that is all it says of it; or ""."""
+        told = self._prior.vocabulary.explained.get(word, ())
+        families = {KNOWN[w][0].family for w in told if w in KNOWN}
+        plain = all(w in KNOWN and w not in COLORS for w in told)
+        return told[-1] if plain and len(families) == 1 and families != {"metal"} else ""
+
+    def _means_material(self, word: str) -> bool:
+        """Whether a word that no table knows says anything of a material."""
+        told = self._prior.vocabulary.explained.get(word, ())
+        if word in LOOK_OF or any(w in KNOWN for w in told):
+            return True
+        meaning = self._meaning(word)
+        return max(float(self._meaning(name) @ meaning) for name in KNOWN) > ALIKE
+
+    def _nearest(self, phrase: Phrase, metal: bool) -> str:
         """The name of a substance, metal or not, whose words mean most nearly the same."""
+        if phrase.substance and bool(KNOWN[phrase.substance][0].metallic) == metal:
+            return phrase.substance
+        names = [name for name, found in KNOWN.items() if bool(found[0].metallic) == metal]
+        wanted = self._meaning(" ".join(phrase.unknown))
+        return max(names, key=lambda name: float(self._meaning(name) @ wanted))
+
+    def _meaning(self, text: str) -> np.ndarray:
+        """(D,) mean direction of the words of a text; zero for what resembles nothing."""
         vocabulary = self._prior.vocabulary
+        total = np.sum([vocabulary.vector(word) for word in vocabulary.read(text)] or [np.zeros(vocabulary.vectors.shape[1])], 0)
+        length = float(np.linalg.norm(total))
+        return total / length if length > 0 else total
 
-        def meaning(text: str) -> np.ndarray:
-            total = np.sum([vocabulary.vector(word) for word in vocabulary.read(text)], 0)
-            return total / max(float(np.linalg.norm(total)), 1e-9)
-
-        names = [name for name, substance in BY_NAME.items() if bool(substance.metallic) == metal]
-        wanted = meaning(words)
-        return max(names, key=lambda name: float(meaning(name) @ wanted))
-
-    def _weather(self, phrase: Phrase, where: tuple[Mask, ...] = ()) -> list[Layer]:
-        """What words of wear and weather lay over a phrase's coat."""
+    def _weather(self, phrase: Phrase, where: tuple[Mask, ...] = (), under: Coat | None = None) -> list[Layer]:
+        """What words of wear and weather lay over a phrase's coat. Args: under: what shows where it is worn, if that is known."""
         layers = []
-        for word in phrase.weather:
-            if word not in WEATHER:
-                continue
+        for word in _weathers(phrase):
             weather = WEATHER[word]
-            coat = self._stuff(weather.substance) if weather.substance else self._beneath(phrase)
-            layers += [Layer(coat, (*where, region.mask()), weather.thickness, weather.strength) for region in weather.regions]
+            coat = self._named(weather.stuff) if weather.stuff else self._beneath(phrase, under)
+            mask = weather.region.mask(word)
+            if not weather.stuff and phrase.shows and phrase.shows.region:
+                mask = phrase.shows.region.mask(phrase.shows.where)
+            layers.append(Layer(coat, (*where, mask), weather.thickness, weather.strength))
         return layers
 
-    def _stuff(self, name: str) -> Coat:
-        """Dust, dirt and their like."""
-        look, color, roughness = STUFFS[name]
-        return self._sized(Coat(look, _triple(rgb(color)), roughness, 0.0, said=name))
+    def _named(self, name: str) -> Coat:
+        """What weather leaves: dust, dirt and their like."""
+        return self._of(stuff(name, False), Phrase(substance=name))
 
-    def _beneath(self, phrase: Phrase) -> Coat:
+    def _beneath(self, phrase: Phrase, under: Coat | None) -> Coat:
         """What shows where a coat is worn through."""
+        if phrase.shows:
+            return self._coat(phrase.shows)
+        if under and _coats(phrase):
+            return under
         own = self._coat(phrase)
-        family = BY_NAME[phrase.substance].family if phrase.substance in BY_NAME else ""
-        if family == "paint":
-            return self._coat(Phrase(substance="pine" if "wood" in phrase.substance else "steel", words=["bare"]))
-        if family == "metal":
-            return replace(own, roughness=max(0.12, (own.roughness or 0.3) * 0.55), said=f"bare {own.said}")
-        color = None if own.color is None else _triple(np.array(own.color) + 0.35 * (1 - np.array(own.color)) * 0.6)
-        return replace(own, color=color, roughness=min(1.0, (own.roughness or 0.5) + 0.15), said=f"worn {own.said}")
+        family = KNOWN[phrase.substance][0].family if phrase.substance else ""
+        if family == "paint" or own.look in ("paint", "car paint", "painted wood"):
+            return self._named("pine" if "wood" in phrase.substance else "steel")
+        return _worn(own)
 
     def _sized(self, coat: Coat) -> Coat:
-        return replace(coat, metres=self._metres or METRES[coat.look])
+        return replace(coat, metres=self._metres or METRES.get(coat.look, 1.0))
 
 
 def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
     """The base, and what lies over it from below: "spots on tan", "paint peeling off wood" name the upper one first."""
-    first, rest = phrases[0], phrases[1:]
-    if rest and rest[0].join in ("on", "over", "peel") and rest[0].region is None:
-        base = rest[0]
-        over = replace(first, join=rest[0].join)
-        return replace(base, thing=base.thing or first.thing), [over, *rest[1:]]
-    if rest and rest[0].join in ("above", "below") and first.region and not rest[0].region:
-        rest[0] = replace(rest[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
-    if rest and first.thing and not (first.substance or first.colors or first.unknown) and rest[0].region is None and rest[0].substance:
-        rest[0] = replace(rest[0], thing=first.thing, weather=first.weather + rest[0].weather)  # "a chair, oak"
-        return rest[0], rest[1:]
-    return first, rest
+    base = 0
+    while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
+        base += 1
+    upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in zip(phrases, phrases[1 : base + 1], strict=False)]
+    return _placed(phrases[base], [*reversed(upper), *phrases[base + 1 :]])
 
 
-def look_of(name: str, substance: Substance, finish: list[str]) -> str:
-    """The look of a substance by name: its own, under its finish where there is one for it, or that of its family."""
-    own = LOOK_OF.get(name, name)
-    for word in finish:
-        if f"{word} {own}" in LOOKS:
-            return f"{word} {own}"
-    return own if own in LOOKS else FAMILY_LOOKS[substance.family]
+def _stands(first: Phrase, second: Phrase) -> bool:
+    """Whether a thing stands on its own part, "a dragon on a wooden base", rather than a stuff on what is beneath."""
+    part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
+    return part and not first.region and first.substance not in GATHERS
 
 
-def _chosen(name: str, colored: bool) -> Substance:
-    """Of substances with a name, the one that takes colours where a colour is named."""
-    found = [s for s in SUBSTANCES if name in s.names]
-    return next((s for s in found if s.paintable == colored), found[0])
+def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
+    """The base among phrases: that of the body, where one says so; a covering is the base of what has no stuff of its own."""
+    body = next((k for k, p in enumerate(over) if p.region and p.region.kind == "all" and p.says_what), None)
+    if body is not None:
+        thing = first.thing
+        alone = bool(thing) and not (first.substance or first.colors or first.unknown)
+        first, over = over[body], [*([] if alone else [first]), *over[:body], *over[body + 1 :]]
+        first = replace(first, thing=first.thing or (thing if alone else ""))
+    told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
+    bare = bool(first.thing) and not (told or first.substance or first.colors or first.unknown or first.animal)
+    if bare and over and over[0].region is None and over[0].says_what and _covers(over[0]):
+        first, over = replace(over[0], thing=first.thing, join=Join(""), weather=[*first.weather, *over[0].weather]), over[1:]
+    if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
+        over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
+    if over and over[0].region and first.region and {over[0].region.kind, first.region.kind} == {"above", "below"} and over[0].where in ("above", "below"):
+        over[0] = replace(over[0], region=over[0].region._replace(share=1 - first.region.share))
+    if first.thing in TABLES:
+        over = [replace(p, region=TABLE_PARTS.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
+    return first, over
 
 
-def _color(phrase: Phrase) -> tuple[float, float, float]:
-    """sRGB of a phrase's colour words: the last names it, those before it change it; two colours are mixed."""
-    base = [word for word in phrase.colors if word in COLORS]
-    changes = [word for word in phrase.colors if word in CHANGES or word in LEANINGS]
-    if not base:
-        base, changes = ["grey"], changes
-    colors = [named(" ".join([*changes, word]) if word in (base[-1],) else word) for word in base]
-    return _triple(np.mean(colors, 0))
+def _coats(phrase: Phrase) -> bool:
+    """Whether it is a thin coat on something."""
+    return bool(phrase.substance) and (_family(phrase) == "paint" or phrase.substance in COATINGS)
 
 
-def _finish(phrase: Phrase, substance: Substance) -> tuple[float, float] | None:
-    table = {**FINISHES, **FINISHES_METAL} if substance.metallic else {**FINISHES_METAL, **FINISHES}
-    found = [table[word] for word in phrase.finish if word in table]
-    return found[0] if found else None
+def _covers(phrase: Phrase) -> bool:
+    """Whether what covers a thing is all that one sees of it: leather does, moss does not."""
+    gathers = ONCE.get(phrase.substance, phrase.substance) in GATHERS
+    return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
 
 
-def _faded(color: np.ndarray, phrase: Phrase) -> tuple[float, float, float]:
+def _usual_size(phrases: list[Phrase]) -> float | None:
+    """Metres of the thing that is named first, if any, as large as words say."""
+    things = [OBJECTS[phrase.thing] for phrase in phrases if phrase.thing]
+    if not things:
+        return None
+    factor = np.prod([TIMES[word] for phrase in phrases for word in phrase.size] or [1.0])
+    return float(min(max(things[0].metres * factor, LEAST), MOST))
+
+
+def _once(layers: list[Layer]) -> list[Layer]:
+    """No layer twice."""
+    return list({(layer.coat.look, layer.coat.color, layer.masks): layer for layer in reversed(layers)}.values())[::-1]
+
+
+def _weathers(phrase: Phrase) -> list[str]:
+    """The words of weather of a phrase from below, one for each thing that weather does."""
+    told: dict[tuple[str, str], str] = {}
+    for word, weather in WEATHER.items():
+        if word in phrase.weather:
+            told.setdefault((weather.stuff, weather.region.kind), word)
+    if len(told) > 1 and ("grime", "crevices") in told and any(key != ("grime", "crevices") and key[1] == "crevices" for key in told):
+        del told["grime", "crevices"]  # what else lies in crevices hides it
+    return list(told.values())
+
+
+def _color(phrase: Phrase, own: RGB | None = None) -> RGB:
+    """sRGB of a phrase's colour words: those that name colours mixed, or the stuff's own, changed by those that change one."""
+    base = [rgb(COLORS[w]) if w in COLORS else np.array(KNOWN[w][0].color) for w in phrase.colors if w in COLORS or w in KNOWN]
+    color = np.mean(base, 0) if base else np.array((0.5, 0.5, 0.5) if own is None else own)
+    for word in (*LEANINGS, *CHANGES):
+        if word in phrase.colors:
+            color = changed(color, word)
+    return _triple(color)
+
+
+def _described(wanted: Stuff, named: RGB) -> RGB:
+    """A named colour as this stuff has it: "green moss" is moss."""
+    if wanted.paintable or wanted.metallic:
+        return named
+    own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
+    if float(np.linalg.norm(own - other)) > SIMILAR:
+        return named
+    return _triple(np.array(wanted.color) + 0.3 * (np.array(named) - np.array(wanted.color)))
+
+
+def _roughness(phrase: Phrase, metal: bool) -> float | None:
+    """What words of finish say, if any does."""
+    table = {**FINISHES, **FINISHES_METAL} if metal else {**FINISHES_METAL, **FINISHES}
+    found = [sum(table[word]) / 2 for word in phrase.finish if word in table]
+    return float(np.mean(found)) if found else None
+
+
+@cache
+def _family_of(look: str) -> str:
+    """The family of the stuffs that have a look, or one of its finishes."""
+    found = (s.family for stuffs in KNOWN.values() for s in stuffs if look in (s.look, s.look.split(" ")[-1]))
+    return next(found, "metal" if look.split(" ")[0] in FINISH_LOOKS else "")
+
+
+def _family(phrase: Phrase) -> str:
+    return KNOWN[phrase.substance][0].family
+
+
+def _worn(coat: Coat) -> Coat:
+    """A coat where it is worn: metal is polished, all else is lighter and rougher."""
+    rough = coat.roughness or 0.5
+    if (coat.metallic or 0.0) > 0.5:
+        return replace(coat, roughness=max(0.12, 0.55 * rough), said=f"bare {coat.said}")
+    color = None if coat.color is None else _triple(np.array(coat.color) + 0.2 * (1 - np.array(coat.color)))
+    return replace(coat, color=color, roughness=min(1.0, rough + 0.15), said=f"worn {coat.said}")
+
+
+def _faded(color: np.ndarray, phrase: Phrase) -> RGB:
     keep = float(np.prod([FADED.get(word, 1.0) for word in phrase.weather]))
     return _triple(np.mean(color) + keep * (np.asarray(color) - np.mean(color)))
 
 
-def _triple(color: np.ndarray) -> tuple[float, float, float]:
+def _triple(color: np.ndarray) -> RGB:
     red, green, blue = np.clip(color, 0, 1).tolist()
     return red, green, blue
 
 
 def _said(phrase: Phrase) -> str:
-    return " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance or phrase.thing]).strip()
-
-
-def explained(recipe: Recipe) -> list[tuple[str, str, str, str, str, str]]:
-    """A recipe as rows for people: what, where, look, colour, roughness, metal."""
-    rows = [_row(recipe.base, "everywhere")]
-    rows += [_row(layer.coat, " and ".join(map(_place, layer.masks))) for layer in recipe.layers]
-    return rows
-
-
-def _row(coat: Coat, where: str) -> tuple[str, str, str, str, str, str]:
-    color = "its own" if coat.color is None else "#" + "".join(f"{round(255 * c):02x}" for c in coat.color)
-    rough = "its own" if coat.roughness is None else f"{coat.roughness:.2f}"
-    return coat.said or coat.look, where, coat.look, color, rough, "metal" if coat.metallic else ""
-
-
-def _place(mask: Mask) -> str:
-    share = f"{mask.share:.0%}"
-    names = {"below": f"lowest {share}", "above": f"highest {share}", "up": f"facing up, {share}", "edges": f"edges, {share}",
-             "crevices": f"crevices, {share}", "hidden": f"inside, {share}"}  # fmt: skip
-    return ("all but " if mask.invert else "") + names.get(mask.kind, f"{mask.kind}, {share}")
+    """A phrase in few words."""
+    boards = ["boards"] if phrase.boards and "board" not in phrase.substance and "plank" not in phrase.substance else []
+    return " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance or phrase.animal or phrase.thing, *boards]).strip()

@@ -1,28 +1,110 @@
-"""Which look each name has, and what gathers on things."""
+"""What a name of a substance means: its look, its mean colour and roughness, whether it is metal; and words that change a look.
 
-from stages.prior.places import Region
+`names.py` has the names that training teaches; looks.tsv gives these their looks, and stuffs.tsv adds names that only the
+reading of prompts knows. A look that is not there is replaced by one of its family. """
 
-LOOK_OF = {"rusty iron": "rust", "rusty metal": "rust", "rusted metal": "rust"}
-"""A substance's name → the look it has, where that has another name."""
+from collections.abc import Collection
+from typing import NamedTuple
 
-FAMILY_LOOKS = dict.fromkeys(("metal", "rust", "wood", "stone", "ceramic", "plastic", "paint", "fabric", "organic", "leather", "paper",
-                              "gem", "ice"), "granite")  # fmt: skip
-"""Family of a substance → the look of one whose own is missing."""
+import numpy as np
 
-GATHERS = {
-    "moss": Region("crevices", 0.4, 0.18, 1.0), "rust": Region("chips", 0.4, 0.12, 1.0), "dirt": Region("crevices", 0.35, 0.15, 1.0),
-    "verdigris": Region("crevices", 0.35, 0.14, 1.0), "snow": Region("up", 0.42, 0.12, 0.4), "frost": Region("edges", 0.35, 0.1, 1.0),
-    "mud": Region("below", 0.25, 0.15, 1.0), "lichen": Region("patches", 0.25, 0.1, 1.0), "ice": Region("up", 0.3, 0.15, 0.6),
-    "gold leaf": Region("patches", 0.5, 0.25, 0.8), "ash": Region("up", 0.45, 0.2, 1.0), "soot": Region("patches", 0.4, 0.3, 1.0),
+from stages.material.substances import LOOKS
+from stages.prior.colors import rgb
+from stages.prior.names import SUBSTANCES, Substance
+from stages.prior.objects import rows, words
+
+
+class Stuff(NamedTuple):
+    """color: (3,) sRGB mean. paintable: a colour that words name may replace its own."""
+
+    name: str
+    family: str
+    look: str
+    color: tuple[float, float, float]
+    roughness: float
+    metallic: float
+    paintable: bool = True
+
+
+LOOK_OF = {name: look for look, names in rows("looks.tsv") for name in words(names)}
+"""A substance's name → the look it should have; also of names whose means the reader knows alone."""
+
+FAMILY_LOOKS = {
+    "metal": ("steel",), "rust": ("rust",), "wood": ("oak",), "stone": ("rock", "granite"), "ceramic": ("porcelain", "glossy plastic"),
+    "plastic": ("plastic",), "paint": ("paint",), "fabric": ("linen", "denim"), "leather": ("leather", "rubber"),
+    "organic": ("skin", "wax"), "paper": ("paper", "foam"), "gem": ("glass",), "ice": ("snow", "foam"),
 }  # fmt: skip
-"""What gathers of itself, and where it does when nobody says."""
+"""Family → looks that stand in for one that is missing, the best first."""
 
-LAYERED = {"moss": 3e-3, "snow": 8e-3, "rust": 2e-4}
-"""Looks that stand proud of what is beneath, metres."""
+GENERIC = frozenset(
+    "wood wooden timber fabric cloth textile metal metallic stone rock ceramic pottery plastic paint painted leather paper".split()
+)
+"""Names of whole families: another name before one of them says which ("teak wood")."""
 
-STUFFS = {
-    "rust": ("rust", "#7a4122", 0.88), "dust": ("granite", "#a39a8c", 0.95), "dirt": ("granite", "#3d3226", 0.95),
-    "moss": ("granite", "#4a5a22", 0.95), "snow": ("granite", "#eef1f4", 0.85), "grime": ("granite", "#3a352c", 0.85),
-    "soot": ("granite", "#1d1b1a", 0.92), "tarnish": ("granite", "#3a342c", 0.7),
+BOARDS = frozenset(words("boards, planks, floorboards, wooden boards, wooden planks, wood planks, wood boards, decking, planking, parquet, wooden floor, wood floor"))
+"""Words for sawn boards, which any wood may lie in."""
+
+PATTERNED = frozenset(words("brick, bricks, tile, tiles, roof tiles, shingles, setts, paving, mosaic, stone blocks, stone bricks, concrete blocks"))
+"""Names of what is laid of pieces: a name before one of them is what the pieces are made of."""
+
+ROOFS = dict.fromkeys(("terracotta", "clay", "tile", "tiles", "tiled", "earthenware"), "roof tiles")
+"""What a roof is laid of, where words name its stuff."""
+
+FINISH_LOOKS = {
+    "beaten": "hammered", "forged": "hammered", "dented": "hammered", "burnished": "polished", "mirror": "polished",
+    "mirror-like": "polished", "mirror polished": "polished", "gleaming": "polished", "milled": "machined", "turned": "machined",
+    "cast": "cast", "hammered": "hammered", "brushed": "brushed", "polished": "polished", "machined": "machined",
 }  # fmt: skip
-"""What weather leaves: look, sRGB, roughness."""
+"""Words of finish → the finish whose look of a metal they call for."""
+
+
+PAINTABLE = frozenset(words("ceramic, plastic, paint, fabric, leather, paper, fruit peel, wax, skin, fur, feathers, scales"))
+"""Families and looks that take any colour. Of others a colour that is like their own only describes them: "green moss"."""
+
+
+def _stuff(name: str, s: Substance) -> Stuff:
+    red, green, blue = np.mean([rgb(text) for text in s.colors], 0).tolist()
+    look = LOOK_OF.get(name, name)
+    return Stuff(name, s.family, look, (red, green, blue), sum(s.roughness) / 2, s.metallic, s.paintable)
+
+
+def _extra() -> dict[str, list[Stuff]]:
+    table: dict[str, list[Stuff]] = {}
+    for family, look, color, roughness, names in rows("stuffs.tsv"):
+        red, green, blue = rgb(color).tolist()
+        for name in words(names):
+            table[name] = [Stuff(name, family, look, (red, green, blue), float(roughness), float(family == "metal"), family in PAINTABLE or look in PAINTABLE)]
+    return table
+
+
+def _taught() -> dict[str, list[Stuff]]:
+    table: dict[str, list[Stuff]] = {}
+    for substance in SUBSTANCES:
+        for name in substance.names:
+            table.setdefault(name, []).append(_stuff(name, substance))
+    return table
+
+
+KNOWN = _taught() | _extra()
+"""Each name with what it may mean: of two, one takes colours and one has its own."""
+
+
+def stuff(name: str, colored: bool) -> Stuff:
+    """What a name means. Args: colored: a colour is named with it."""
+    found = KNOWN[name]
+    return next((s for s in found if s.paintable == colored), found[0])
+
+
+def look_of(wanted: Stuff, finish: Collection[str] = (), available: Collection[str] | None = None) -> str:
+    """The look of a stuff under words of finish, where there is one for it; that of its family where its own is missing."""
+    there = LOOKS if available is None else available
+    metal = wanted.look.split(" ")[-1]
+    for word in finish:
+        if wanted.metallic and f"{FINISH_LOOKS.get(word, word)} {metal}" in there:
+            return f"{FINISH_LOOKS.get(word, word)} {metal}"
+    return next((look for look in (wanted.look, metal, *FAMILY_LOOKS[wanted.family]) if look in there), next(iter(there)))
+
+
+def boards_of(wanted: Stuff) -> Stuff:
+    """A wood, sawn into boards."""
+    return wanted._replace(look=f"{wanted.look.removesuffix(' boards')} boards")

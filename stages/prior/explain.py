@@ -1,0 +1,50 @@
+"""A recipe in words, for people: what was understood, and where it lies."""
+
+from stages.material.recipe import Coat, Mask, Recipe
+
+HEADINGS = ("what", "where", "look", "colour", "roughness", "metal")
+
+PLACES = {
+    "all": "everywhere", "below": "lowest {}", "above": "highest {}", "front": "foremost {}", "back": "rearmost {}", "left": "left {}",
+    "right": "right {}", "fade": "fading in over the upper {}", "up": "{} facing up", "down": "{} facing down", "edges": "{} on edges",
+    "crevices": "{} in crevices", "hidden": "innermost {}", "spots": "spots, {}", "stripes": "stripes, {}", "bands": "bands, {}",
+    "checks": "checks, {}", "veins": "veins, {}", "patches": "patches, {}", "streaks": "streaks, {}", "scratches": "scratches, {}",
+    "chips": "chips, {}",
+}  # fmt: skip
+"""Kind of a mask → where it is, with its share."""
+
+Row = tuple[str, str, str, str, str, str]
+
+
+def explained(recipe: Recipe) -> list[Row]:
+    """A recipe as rows under `HEADINGS`, the base first."""
+    rows = [_row(recipe.base, "everywhere")]
+    return rows + [_row(layer.coat, " and ".join(map(place, layer.masks))) for layer in recipe.layers]
+
+
+def parts(recipe: Recipe) -> list[str]:
+    """A line for each coat: "black rubber: lowest 8 % (sole)"."""
+    return [f"{what}: {where}" for what, where, *_ in explained(recipe)]
+
+
+def table(recipe: Recipe) -> list[str]:
+    """`explained` as lines with aligned columns."""
+    rows = [HEADINGS, *explained(recipe)]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(HEADINGS))]
+    return ["  ".join(f"{text:{width}}" for text, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def place(mask: Mask) -> str:
+    """Where a mask lies: "lowest 8 % (sole)"."""
+    share = f"{1 - mask.share if mask.invert else mask.share:.0%}".replace("%", " %")
+    where = PLACES[mask.kind].format(share)
+    if mask.invert:
+        where = f"what is left of it, {share}"
+    said = mask.said.split(" ")[-1] if mask.said.startswith(("on ", "at ", "in ", "to ", "around ", "along ", "over ", "inside ")) else mask.said
+    return f"{where} ({said})" if said and said not in where else where
+
+
+def _row(coat: Coat, where: str) -> Row:
+    color = "its own" if coat.color is None else "#" + "".join(f"{round(255 * c):02x}" for c in coat.color)
+    rough = "its own" if coat.roughness is None else f"{coat.roughness:.2f}"
+    return coat.said or coat.look, where, coat.look, color, rough, "yes" if (coat.metallic or 0) > 0.5 else "no"
