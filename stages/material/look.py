@@ -50,9 +50,9 @@ def palette(t: Array, *stops: str) -> Array:
     return ramp[:, low] + (ramp[:, low + 1] - ramp[:, low]) * (x - low)
 
 
-def mix(a: Array, b: Array, t: Array) -> Array:
+def mix(a: Array | float, b: Array | float, t: Array | float) -> Array:
     """From a at t = 0 to b at 1. Args: (3, P) or (P,) or numbers; t (P,)."""
-    return a + (b - a) * t
+    return np.asarray(a + (b - a) * t)
 
 
 def shade(color: Array, amount: Array) -> Array:
@@ -83,3 +83,43 @@ def to_oklab(linear: NDArray) -> NDArray:
 def from_oklab(lab: NDArray) -> NDArray:
     """OKLab to linear Rec. 709, clamped to 0 … 1. Args: (3, P). Returns: (3, P)."""
     return np.clip(np.linalg.solve(TO_LMS, np.linalg.solve(TO_LAB, lab) ** 3), 0, 1)
+
+
+def each(t: Array, shown: Array | float, *stops: str) -> Array:
+    """Colours of units that differ, and the mean of all where the footprint hides single ones.
+
+    Args: t (P,) a random number of the unit that a point lies in; shown (P,) 0 … 1, see `patterns.fading`; stops sRGB hex.
+    Returns: (3, P).
+    """
+    mean = _ramp(stops if len(stops) > 1 else stops * 2).mean(1, keepdims=True)
+    return mean + (palette(t, *stops) - mean) * shown
+
+
+@cache
+def _blurred(stops: tuple[str, ...]) -> Array:
+    """(BLURS, 3, STEPS) the ramp averaged over a normal distribution of its argument, of deviation 0 … 1 in even steps."""
+    known = np.linspace(0, 1, STEPS)
+    wide = np.linspace(-3, 4, 7 * STEPS)
+    ramp = np.stack([np.interp(wide, known, axis) for axis in _ramp(stops)])
+    out = [_ramp(stops)]
+    for deviation in np.linspace(0, 1, BLURS)[1:]:
+        weights = np.exp(-0.5 * ((known[:, None] - wide) / deviation) ** 2)
+        out.append((ramp @ (weights / weights.sum(1, keepdims=True)).T).astype(np.float32))
+    return np.stack(out)
+
+
+BLURS = 17
+
+
+def averaged(t: Array, hidden: Array, *stops: str) -> Array:
+    """`palette` of a noise of which the footprint hides a part: the mean colour over what is hidden.
+
+    Args: t (P,); hidden (P,) deviation of the hidden part in units of t, see `patterns.lost`; stops sRGB hex.
+    Returns: (3, P) linear.
+    """
+    ramps = _blurred(stops if len(stops) > 1 else stops * 2)
+    x = (np.clip(t, 0, 1) * np.float32(STEPS - 1) + np.float32(0.5)).astype(np.int32)
+    y = np.clip(hidden, 0, 1) * np.float32(BLURS - 1.001)
+    low = y.astype(np.int32)
+    sharp, soft = ramps[low, :, x].T, ramps[low + 1, :, x].T
+    return sharp + (soft - sharp) * (y - low)

@@ -5,6 +5,7 @@ are averaged over it, and what faded from below a threshold is put back as a sof
 Where the place repeats, lengths are rounded so that a whole number of them fits its period. """
 
 import math
+from functools import cache
 from statistics import NormalDist
 from typing import Any, NamedTuple
 
@@ -175,8 +176,8 @@ def cells(at: Place, size: float, seed: int = 0, jitter: float = 1.0, stretch: A
 
 
 class Spots(NamedTuple):
-    """Separate spots. inside: (P,) distance to the spot's rim, metres, positive within. cover: (P,) share of the footprint.
-    radius: (P,) of the nearest spot, metres. cells: of which each holds at most one.
+    """Separate spots. inside: (P,) distance to the spot's rim, metres, positive within. cover: (P,) share of the footprint,
+    the mean of all where it hides single ones. radius: (P,) of the nearest spot, metres. cells: each holds at most one.
     """
 
     inside: Array
@@ -194,7 +195,10 @@ def spots(
     low, high = radius
     mine = np.float32(low) + np.float32(high - low) * found.random(1) ** 2
     inside = np.where(found.random(2) < share, mine - found.near, np.float32(-1))
-    return Spots(inside, edge(inside, at.footprint), mine, found)
+    wide = high - low
+    volume = low**3 + low**2 * wide + 0.6 * low * wide**2 + wide**3 / 7  # the mean of mine³
+    mean, seen = share * 4.19 * volume / size**3, fading(2 * high, at.footprint)
+    return Spots(inside, mean + (edge(inside, at.footprint) - mean) * seen, mine, found)
 
 
 class Marks(NamedTuple):
@@ -233,6 +237,8 @@ def marks(
     own = np.float32(width / 2) * np.sqrt(np.clip(1 - along * along, 0, 1))
     cover = np.where(here, line(distance * np.float32(length), own, at.footprint), 0)
     across = np.where(here, distance * np.float32(2 * length / width), 9)
+    mean = 1 - math.exp(-count * 0.785 * width / length * (1 - vary / 2))
+    cover = mean + (cover - mean) * fading(max(width, length / count) / 2, at.footprint)  # wider than the gaps: strokes merge
     return Marks(cover.astype(np.float32), across.astype(np.float32), along, ident)
 
 
@@ -334,3 +340,126 @@ def weave(at: Place, pitch: float, draft: str = "plain", fill: float = 0.92, see
         height.astype(np.float32), shown_warp.astype(np.float32), across_it.astype(np.float32), gap,
         _hash(thread, at.face, seed_of(at, seed)), seen.astype(np.float32),
     )  # fmt: skip
+
+
+class Cracks(NamedTuple):
+    """Cracks, joints or veins. cover: (P,) share of the footprint. near: (P,) distance to the middle of the nearest open one,
+    metres, larger where it is about to close. ident: (P,) uint32 of the largest piece that they cut out.
+    """
+
+    cover: Array
+    near: Array
+    ident: NDArray[np.uint32]
+
+
+def cracks(
+    at: Place, size: float, width: float, share: float = 0.6, seed: int = 0, levels: int = 2, ragged: float = 0.07,
+    stretch: Axes = SQUARE,
+) -> Cracks:  # fmt: skip
+    """Cracks that branch and peter out: borders of ragged pieces, within them borders of smaller ones, thinner.
+
+    size: of the largest pieces, metres. width: of the widest cracks, metres. share: how much of the borders is open, 0 … 1.
+    ragged: how far cracks stray, as a share of the size.
+    """
+    bent = warped(at, ragged * size, size, seed, 5)
+    closed: Array = np.ones(len(at), np.float32)
+    nearest: Array = np.full(len(at), 9 * size, np.float32)
+    mean_open = float(np.clip(share + 0.5 * NORMAL, 0, 1).mean())
+    ident = np.zeros(len(at), np.uint32)
+    for level in range(levels):
+        scale, widest = size / 2.4**level, width / 1.7**level
+        found = cells(bent, scale, seed + 7 * level, 1.0, stretch)
+        open_here = np.clip(share + 0.5 * noise(at, 1.3 * scale, seed + 7 * level + 1), 0, 1)
+        shown = fading(0.5 * scale * min(stretch), at.footprint)
+        mean = min(BORDERS * widest / scale / min(stretch) * mean_open, 1)
+        cover = mean + (line(found.border, np.float32(widest / 2) * open_here, at.footprint) - mean) * shown
+        closed = closed * (1 - cover)
+        nearest = np.minimum(nearest, found.border + np.float32(0.7 * scale) * np.maximum(0.35 - open_here, 0))
+        ident = found.ident if level == 0 else ident
+    return Cracks(1 - closed, nearest, ident)
+
+
+BORDERS = 2.8
+"""Area of the borders of cells of size 1 in a unit of space (measured)."""
+
+NORMAL = np.array([NormalDist().inv_cdf((k + 0.5) / 64) for k in range(64)])
+"""A normal distribution in 64 equal parts."""
+
+
+class Pebbles(NamedTuple):
+    """Rounded pieces side by side. inside: (P,) distance to the piece's rim, metres, positive within. cover: (P,) share of the
+    footprint. dome: (P,) 0 at the rim … 1 on the round back. shown: (P,) how much of single pieces the footprint
+    shows. cells: the pieces.
+    """
+
+    inside: Array
+    cover: Array
+    dome: Array
+    shown: Array
+    cells: Cells
+
+
+def pebbles(
+    at: Place, size: float, gap: float = 0.0, corner: float = 0.5, seed: int = 0, jitter: float = 0.8,
+    stretch: Axes = SQUARE, depth: float = 1.0,
+) -> Pebbles:  # fmt: skip
+    """Pieces that fill the ground, from cut stones to round pebbles.
+
+    size: of a piece, metres. gap: between pieces, metres. corner: 0 sharp polygons, 1 round. jitter: 0 rows, 1 fully random.
+    depth: how much the third axis counts: 1 pieces strewn through space, as they are cut; 0 stones laid side by side in a face.
+    """
+    found = cells(at, size, seed, jitter, stretch)
+    inside, dome = _piece(found, gap, corner, depth)
+    shown = fading(size * min(stretch), at.footprint)
+    cover, back = edge(inside, at.footprint), dome
+    if len(at) and shown.min() < 1:
+        mean_cover, mean_back = _mean_piece(gap / size, corner, jitter, depth)
+        cover, back = mean_cover + (cover - mean_cover) * shown, mean_back + (back - mean_back) * shown
+    return Pebbles(inside, cover, back, shown, found)
+
+
+def _piece(found: Cells, gap: float, corner: float, depth: float) -> tuple[Array, Array]:
+    """Distance to the rim, metres, and the rise of the back, 0 … 1, of `pebbles`. Returns: (P,), (P,)."""
+    x, y, z = found.offset
+    straight = found.border - np.float32(gap / 2)
+    circle = np.float32(found.size * (1.05 - 0.5 * corner)) - np.sqrt(x * x + y * y + np.float32(depth) * z * z)
+    soft = np.float32(0.18 * corner * found.size + 1e-9)  # over which the straight side turns into the round corner
+    join = np.clip(0.5 + 0.5 * (circle - straight) / soft, 0, 1)
+    inside = circle + (straight - circle) * join - soft * join * (1 - join)
+    rise = np.clip(inside / np.float32(0.38 * found.size), 0, 1)
+    return inside, np.sqrt(rise * (2 - rise))
+
+
+@cache
+def _mean_piece(gap: float, corner: float, jitter: float, depth: float) -> tuple[float, float]:
+    """Share that pieces of size 1 cover, and the mean of their backs, over 20,000 points."""
+    p = np.random.default_rng(0).uniform(0, 100, (3, 20_000)).astype(np.float32)
+    probe = Place(p, p[:2], np.zeros(p.shape[1], np.int32), np.full(p.shape[1], 1e-3, np.float32))
+    inside, dome = _piece(cells(probe, 1.0, 0, jitter), gap, corner, depth)
+    return float((inside > 0).mean()), float(dome.mean())
+
+
+class Ripples(NamedTuple):
+    """crest: (P,) −1 in the troughs … 1 on the crests, mean 0. along: (P,) 0 … 1 from one steep side to the next.
+    shown: (P,) how much of them the footprint shows.
+    """
+
+    crest: Array
+    along: Array
+    shown: Array
+
+
+def ripples(at: Place, length: float, wander: float, seed: int = 0) -> Ripples:
+    """Ripples across the second axis that wander, fork and end, as wind and waves leave them in sand: one side steep.
+
+    length: from crest to crest, metres. wander: distance between forks, about, metres.
+    """
+    _, fitted = _fitted(at.period[1], length, 1)
+    real, imaginary = noise(at, wander, seed, (1.6, 1, 1)), noise(at, wander, seed + 1, (1.6, 1, 1))
+    turns = at.p[1] / np.float32(fitted) + np.arctan2(real, imaginary) / np.float32(2 * math.pi)  # a fork where both are 0
+    along = turns - np.floor(turns)
+    strength = np.clip(np.hypot(real, imaginary) / 0.6, 0, 1)
+    shown = fading(length, at.footprint)
+    steep = np.float32(0.7)
+    crest = np.where(along < steep, -np.cos(math.pi * along / steep), np.cos(math.pi * (along - steep) / (1 - steep)))
+    return Ripples((crest * strength * shown).astype(np.float32), along.astype(np.float32), shown)

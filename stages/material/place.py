@@ -37,6 +37,13 @@ class Place:
         p = np.concatenate([self.uv, self.face[None] * np.float32(17.31)])
         return replace(self, p=p, period=(self.period[0], self.period[1], 0.0))
 
+    @property
+    def upright(self) -> "Place":
+        """The same with up as the second axis of p: on things the third, on a flat swatch, which has none, up the picture."""
+        if self.period[1]:
+            return self
+        return replace(self, p=self.p[[0, 2, 1]], period=(self.period[0], self.period[2], self.period[1]))
+
     def moved(self, offset: NDArray[np.float32]) -> "Place":
         """The same points displaced. Args: offset (3, P) metres, itself of this place's period."""
         return replace(self, p=self.p + offset)

@@ -1,46 +1,477 @@
-"""Stones: mineral grains, veins, beds and pores."""
+"""Stones: mineral grains, veins, beds, pores, cleavage and pieces."""
+
+from typing import NamedTuple
 
 import numpy as np
 
-from stages.material.look import Look, mix, palette, shade, tint
-from stages.material.patterns import Spectrum, cells, fading, fbm, noise, threshold, warped
+from stages.material.look import Look, averaged, each, mix, palette, shade, tint
+from stages.material.patterns import (
+    Array,
+    Spectrum,
+    cells,
+    cracks,
+    edge,
+    exceeds,
+    fading,
+    fbm,
+    lost,
+    masked,
+    noise,
+    pebbles,
+    spots,
+    threshold,
+    warped,
+)
 from stages.material.place import Place
 
 
+class Granite(NamedTuple):
+    """feldspar, quartz, mica: colours, sRGB. pale: share of feldspar. dark: share of mica. size: of a grain, metres."""
+
+    feldspar: tuple[str, ...] = ("#b4aaa2", "#cfc7bf", "#e0dad4")
+    quartz: tuple[str, ...] = ("#85827f", "#9d9a95", "#b3afa9")
+    mica: tuple[str, ...] = ("#282829", "#353434", "#514e4b")
+    pale: float = 0.5
+    dark: float = 0.2
+    size: float = 0.007
+
+
+GRANITES = {
+    "grey": Granite(),
+    "pink": Granite(("#b3796a", "#c8917f", "#d9ab9a"), ("#8f8884", "#aaa39d", "#c4bdb6"), pale=0.58, dark=0.16, size=0.010),
+    "black": Granite(
+        ("#3a3b3d", "#4a4b4d", "#5f6061"), ("#2f3031", "#3b3c3d", "#46474a"), ("#282829", "#2a2a2b", "#303032"), 0.3, 0.4, 0.005
+    ),
+}
+
+
+def igneous(at: Place, kind: Granite) -> Look:
+    """Interlocking grains: feldspar pale and in blocks, quartz grey and clear, mica black, shiny and small."""
+    bent = warped(at, 0.07 * kind.size, 0.6 * kind.size, 1, 3)
+    coarse, fine, flake = (
+        cells(bent, kind.size, 2),
+        cells(bent, 0.5 * kind.size, 3),
+        cells(bent, 0.32 * kind.size, 4, 1.0, (1, 1.8, 1)),
+    )
+    show, show_fine, show_flake = (fading(k * kind.size, at.footprint) for k in (1.0, 0.5, 0.32))
+    cloud = fbm(at, Spectrum(12 * kind.size, kind.size, 0.8), 5)
+    pale = (coarse.random(1) < kind.pale) * show + kind.pale * (1 - show)
+    dark = (flake.random(1) < kind.dark * (1.5 - pale) + 0.06 * cloud) * show_flake + kind.dark * (1.5 - kind.pale) * (
+        1 - show_flake
+    )
+    block = threshold(coarse.border, 0.0, 0.1 * kind.size + at.footprint)  # crystals are greyer towards their borders
+    feldspar = each(0.5 * coarse.random(2) + 0.25 * fine.random(3) + 0.25 * block, show, *kind.feldspar)
+    quartz = each(fine.random(4), show_fine, *kind.quartz)
+    color = mix(mix(quartz, feldspar, pale), each(flake.random(5), show_flake, *kind.mica), dark)
+    grit = fbm(at, Spectrum(0.4 * kind.size, 0.0003, 1.0, tails=0.4, patch=0.4), 6)
+    color = tint(shade(color, 0.10 * grit + 0.04 * cloud), 0.07 * (fine.random(7) - 0.5) * show_fine)
+    roughness = 0.34 - 0.12 * dark + 0.10 * pale + 0.04 * grit
+    return Look(color, np.clip(roughness, 0.1, 1), 0.0, 2e-5 * grit - 6e-5 * (dark - kind.dark) + 4e-5 * (pale - kind.pale))
+
+
 def granite(at: Place) -> Look:
-    """Interlocking grains of three minerals: quartz grey and clear, feldspar pale or pink, mica black and shiny."""
-    bent = warped(at, 0.0012, 0.004, 1)
-    coarse, fine = cells(bent, 0.006, 2), cells(bent, 0.0025, 3)
-    show, show_fine = fading(0.006, at.footprint), fading(0.0025, at.footprint)
-    mineral = coarse.random(1)
-    cloud = fbm(at, Spectrum(0.06, 0.01, 0.8), 4)
-    feldspar = palette(coarse.random(2), "#b9ada6", "#cfc5bd", "#d8cfc8")
-    quartz = palette(fine.random(3), "#7d7b79", "#98958f", "#a9a49d")
-    mica = palette(fine.random(4), "#1b1b1d", "#2c2b2c", "#454341")
-    dark = (fine.random(5) < 0.30 + 0.08 * cloud).astype(np.float32) * show_fine + 0.3 * (1 - show_fine)
-    pale = (mineral < 0.52).astype(np.float32) * show + 0.52 * (1 - show)
-    color = mix(mix(quartz, feldspar, pale), mica, dark * (1 - 0.45 * pale))
-    grit = fbm(at, Spectrum(0.002, 0.0003, 1.1, tails=0.4, patch=0.4), 6)
-    color = tint(shade(color, 0.16 * grit + 0.05 * cloud), 0.08 * noise(at, 0.006, 7))
-    roughness = 0.42 - 0.14 * dark * (1 - pale) + 0.08 * pale + 0.05 * grit
-    return Look(color, roughness, 0.0, 4e-5 * grit - 8e-5 * dark + 6e-5 * pale)
+    """Grey granite, sawn and honed."""
+    return igneous(at, GRANITES["grey"])
+
+
+def pink_granite(at: Place) -> Look:
+    """Granite whose feldspar is salmon pink."""
+    return igneous(at, GRANITES["pink"])
+
+
+def black_granite(at: Place) -> Look:
+    """Gabbro, which the trade calls black granite: dark grains of much the same tone that glint."""
+    return igneous(at, GRANITES["black"])
+
+
+class Marble(NamedTuple):
+    """ground: from clear to cloudy. vein: from faint to strong. veins: share of the borders that hold one. haze: how far a
+    vein's colour seeps into the ground, metres.
+    """
+
+    ground: tuple[str, ...]
+    vein: tuple[str, ...]
+    veins: float = 0.45
+    haze: float = 0.02
+
+
+MARBLES = {
+    "white": Marble(("#efede9", "#e6e4e0", "#d8d7d4"), ("#b5b4b2", "#868585"), 0.4, 0.03),
+    "black": Marble(("#29292b", "#2d2c2d", "#3a3837"), ("#8d8881", "#d9d4cb"), 0.5, 0.004),
+    "green": Marble(("#2a3530", "#2e463b", "#486a58"), ("#6f9080", "#c3d1c6"), 0.6, 0.012),
+}
+
+
+def metamorphic(at: Place, kind: Marble) -> Look:
+    """Limestone recrystallised under pressure: a cloudy ground of fine crystals and veins that branch, swell and peter out."""
+    bent = warped(at, 0.02, 0.35, 1, 4)
+    main = cracks(bent, 0.42, 0.009, kind.veins, 3, 2, 0.09, (1, 0.6, 1))
+    hair = cracks(bent, 0.13, 0.0022, kind.veins - 0.15, 4, 1, 0.08)
+    where = threshold(noise(at, 0.5, 5), -0.5, 0.9)
+    cloud = fbm(bent, Spectrum(0.25, 0.004, 0.78, patch=0.4), 6)
+    smoke = np.exp(-main.near / kind.haze) * (0.55 + 0.25 * cloud)
+    vein = np.clip(main.cover * (0.75 + 0.25 * cloud) + 0.6 * hair.cover * (0.3 + where), 0, 1)
+    grain = fbm(at, Spectrum(0.008, 0.0003, 1.12, tails=0.3, patch=0.4), 7)
+    color = palette(0.35 + 0.22 * cloud + 0.8 * smoke, *kind.ground)
+    color = mix(color, palette(0.5 + 0.25 * cloud + 0.3 * grain, *kind.vein), np.clip(vein + 0.35 * np.clip(smoke, 0, 1), 0, 1))
+    color = tint(shade(color, 0.05 * grain), 0.03 * noise(bent, 0.15, 8) + 0.04 * vein)
+    return Look(color, 0.13 + 0.14 * vein + 0.015 * abs(grain), 0.0, 4e-6 * grain - 3e-5 * vein)
 
 
 def marble(at: Place) -> Look:
-    """White crystalline ground, cloudy, with veins that branch: ridges of warped noise, wide and faint, thin and dark."""
-    bent = warped(warped(at, 0.06, 0.35, 1), 0.008, 0.04, 2, 3)
-    wide = abs(noise(bent, 0.30, 3, (1, 1.6, 1)))
-    thin = abs(fbm(warped(bent, 0.02, 0.1, 4), Spectrum(0.16, 0.08, 0.5, (1, 1.4, 1)), 5))
-    where = threshold(noise(at, 0.25, 6), -0.4, 0.8)
-    strong = np.exp(-wide / 0.035) + 0.5 * np.exp(-wide / 0.25)
-    hair = np.exp(-thin / np.maximum(0.02, 0.05 * where)) * where
-    cloud = fbm(bent, Spectrum(0.2, 0.005, 0.75), 7)
-    grain = fbm(at, Spectrum(0.006, 0.0002, 1.15, tails=0.3, patch=0.4), 8)
-    depth = 0.75 * strong * where + 0.55 * hair + 0.05 * np.clip(cloud, 0, 3)
-    color = palette(depth, "#e9e7e3", "#d3d1cd", "#9b9a98", "#63615f")
-    color = tint(shade(color, 0.05 * grain - 0.03 * abs(cloud)), 0.05 * noise(bent, 0.1, 9))
-    return Look(color, 0.16 + 0.12 * np.clip(depth, 0, 1) + 0.02 * grain, 0.0, 6e-6 * grain - 3e-5 * hair)
+    """White marble with grey veins, polished."""
+    return metamorphic(at, MARBLES["white"])
 
 
-LOOKS = {"granite": granite, "marble": marble}
-METRES = {"granite": 0.5, "marble": 1.2}
+def black_marble(at: Place) -> Look:
+    """Black marble with white calcite veins, polished."""
+    return metamorphic(at, MARBLES["black"])
+
+
+def green_marble(at: Place) -> Look:
+    """Serpentine marble: dark green, netted with pale veins."""
+    return metamorphic(at, MARBLES["green"])
+
+
+def bedded(at: Place, wander: float, size: float, seed: int) -> Place:
+    """The place with its second axis across the beds, which rise and fall by `wander` over `size`, metres."""
+    up = at.upright
+    lift = wander * fbm(up, Spectrum(size, size / 8, 0.55, (1, 0.7, 1)), seed)
+    return up.moved(np.stack([0 * lift, lift, 0 * lift]).astype(np.float32))
+
+
+def sandstone(at: Place) -> Look:
+    """Sand laid down in beds and cemented with iron: bands of tan, ochre and rust, each worn back by its own hardness."""
+    beds = bedded(at, 0.03, 0.5, 1)
+    band = fbm(beds, Spectrum(0.16, 0.005, 0.9, (9, 1, 9), patch=0.4), 2)
+    seam = np.clip(fbm(beds, Spectrum(0.03, 0.004, 0.9, (12, 1, 12)), 3) - 1.1, 0, 2)
+    stain = masked(warped(at, 0.03, 0.1, 4), Spectrum(0.3, 0.004, 0.75, patch=0.4), 0.25, 5, 0.5)
+    sand = fbm(at, Spectrum(0.003, 0.0004, 1.05, tails=0.4, skew=-0.15, patch=0.3), 6)
+    wear = fbm(at, Spectrum(0.06, 0.002, 0.85, (1.6, 1, 1.6), skew=-0.1, patch=0.3), 7)
+    color = palette(0.5 + 0.2 * band + 0.05 * wear, "#9a6a45", "#b98b5c", "#cfa878", "#dcc09a")
+    color = mix(color, palette(0.5 + 0.2 * band, "#8f4f2c", "#ad6a3a"), 0.55 * stain)
+    color = tint(shade(color, 0.15 * sand + 0.08 * wear - 0.35 * seam), 0.06 * noise(beds, 0.05, 8, (6, 1, 6)))
+    return Look(color, 0.88 + 0.04 * sand - 0.03 * stain, 0.0, 2e-4 * sand + 9e-4 * band + 1.2e-3 * wear - 2.5e-3 * seam + 2e-4)
+
+
+def limestone(at: Place) -> Look:
+    """Cream mud full of shells: fossils in section, small pores, a dark stylolite here and there."""
+    bent = warped(at, 0.0008, 0.01, 1, 3)
+    shell = spots(bent, 0.016, (0.001, 0.005), 0.55, 2, (1.5, 1, 1))
+    ring = threshold(abs(shell.inside / np.maximum(shell.radius, 1e-5) - 0.25), 0.16, 0.1)
+    fossil = shell.cover
+    pore = masked(at, Spectrum(0.008, 0.0008, 0.9, patch=0.5), 0.035, 3, 0.15)
+    seam = cracks(bedded(at, 0.008, 0.05, 4), 0.22, 0.0016, 0.35, 5, 1, 0.1, (4, 1, 4)).cover
+    cloud = fbm(at, Spectrum(0.3, 0.006, 0.75, (1.5, 1, 1.5), patch=0.4), 6)
+    grit = fbm(at, Spectrum(0.004, 0.0004, 1.05, tails=0.3, skew=-0.2, patch=0.4), 7)
+    color = palette(0.5 + 0.18 * cloud, "#b5a88f", "#cbc0a8", "#d9d0bb", "#e3dccb")
+    color = mix(color, palette(0.4 + 0.5 * ring, "#b3a48a", "#e9e3d5"), 0.7 * fossil)
+    color = tint(shade(color, 0.09 * grit - 0.9 * pore - 0.4 * seam), 0.04 * noise(at, 0.03, 8))
+    return Look(
+        color, 0.72 + 0.05 * grit + 0.12 * pore - 0.08 * fossil, 0.0, 1e-4 * grit + 1.5e-4 * fossil - 9e-4 * pore - 4e-4 * seam
+    )
+
+
+def slate(at: Place) -> Look:
+    """Mud pressed into leaves and split along them: flat terraces with ragged edges, blue-grey, a rusty stain."""
+    bent = warped(at, 0.004, 0.04, 1, 4)
+    leaf = 2.4 * fbm(bent, Spectrum(0.4, 0.003, 0.47, (1.4, 1, 1)), 2)
+    step = np.floor(leaf)
+    rise = leaf - step
+    lip = threshold(0.05 - rise, 0.0, 0.04)  # the broken edge of a leaf catches light, and lies dark below
+    tone = np.sin(step * 12.9898 + 4.0)
+    lines = fbm(at, Spectrum(0.03, 0.0006, 1.0, (5, 1, 1), tails=0.3, patch=0.5), 3)
+    grit = fbm(at, Spectrum(0.003, 0.0004, 1.0, tails=0.4, patch=0.4), 4)
+    rusty = masked(bent, Spectrum(0.16, 0.002, 0.85, patch=0.5), 0.05, 5, 0.7)
+    color = palette(0.5 + 0.34 * tone + 0.03 * lines, "#3f4142", "#4d504f", "#5b5d5a", "#6d6c66")
+    color = mix(color, palette(0.5 + 0.2 * grit, "#55504a", "#6d6455"), 0.6 * rusty)
+    color = tint(
+        shade(color, 0.08 * grit + 0.04 * lines + 0.55 * lip - 0.22 * threshold(rise, 0.9, 0.1)), 0.05 * noise(bent, 0.06, 6)
+    )
+    height = 1.4e-3 * (step + np.clip(rise / 0.06, 0, 1)) + 2e-4 * rise + 4e-5 * lines + 3e-5 * grit - 7e-4
+    return Look(color, np.clip(0.56 + 0.06 * grit + 0.14 * lip + 0.1 * rusty, 0, 1), 0.0, height)
+
+
+def travertine(at: Place) -> Look:
+    """Lime laid down by springs: wavy cream and beige beds, holes drawn out along them where reeds and gas were."""
+    beds = bedded(at, 0.008, 0.25, 1)
+    band = fbm(beds, Spectrum(0.09, 0.002, 0.9, (9, 1, 9), patch=0.4), 2)
+    porous = threshold(noise(beds, 0.05, 3, (6, 1, 6)), 0.1, 0.7)
+    shape = Spectrum(0.011, 0.0006, 0.72, (2.6, 1, 2.6), patch=0.3)
+    thick = fbm(beds, shape, 4) + 1.2 * porous
+    hole = exceeds(thick, 2.3, 0.12, lost(beds, shape))
+    rim = exceeds(thick, 1.9, 0.4, lost(beds, shape)) - hole
+    cloud = fbm(at, Spectrum(0.2, 0.01, 0.8), 5)
+    grain = fbm(at, Spectrum(0.008, 0.0003, 1.1, tails=0.3, skew=-0.15, patch=0.4), 6)
+    color = palette(0.52 + 0.17 * band + 0.05 * cloud, "#a98d6b", "#c6ad8b", "#d9c6a8", "#e8dcc6")
+    color = mix(shade(color, 0.09 * grain - 0.14 * rim), palette(0.5 + 0.2 * grain, "#5f4c38", "#7f6a50"), 0.85 * hole)
+    color = tint(color, 0.06 * noise(beds, 0.04, 7, (5, 1, 5)))
+    return Look(color, 0.4 + 0.05 * grain - 0.03 * band + 0.4 * hole, 0.0, 2e-5 * grain + 3e-5 * band - 2.2e-3 * hole + 1.2e-4)
+
+
+def basalt(at: Place) -> Look:
+    """Lava that cooled with gas in it: near black, fine, riddled with round vesicles of all sizes, some filled white."""
+    bent = warped(at, 0.0005, 0.005, 1, 3)
+    large, small = spots(bent, 0.013, (0.0015, 0.006), 0.85, 2), spots(bent, 0.005, (0.0006, 0.0022), 0.85, 3)
+    full = (large.cells.random(5) < 0.03) * fading(0.014, at.footprint)
+    hole = np.maximum(large.cover, small.cover)
+    depth = np.sqrt(np.clip(np.maximum(large.inside, small.inside), 0, 0.003) / 0.003)
+    cloud = fbm(at, Spectrum(0.15, 0.005, 0.8, patch=0.4), 4)
+    grit = fbm(at, Spectrum(0.004, 0.0004, 1.0, tails=0.5, skew=0.15, patch=0.4), 5)
+    color = palette(0.5 + 0.14 * cloud + 0.1 * grit, "#434345", "#555454", "#686664", "#807c77")
+    color = mix(shade(color, 0.14 * grit), palette(0.5 + 0.2 * grit, "#282829", "#363535"), 0.85 * hole)
+    color = tint(mix(color, palette(0.5 + 0.3 * grit, "#b8b4aa", "#d6d3ca"), full * hole), 0.05 * noise(at, 0.02, 6))
+    height = 1.2e-4 * grit + 6e-4 * cloud - 1.6e-3 * depth * (1 - 0.9 * full) + 4e-4
+    return Look(color, 0.82 + 0.05 * grit + 0.07 * hole, 0.0, height)
+
+
+def terrazzo(at: Place) -> Look:
+    """Chips of marble in cement, ground flat and polished: three sizes of broken pieces, the larger over the smaller."""
+    grain = fbm(at, Spectrum(0.003, 0.0004, 1.0, tails=0.4, patch=0.3), 1)
+    cloud = fbm(at, Spectrum(0.3, 0.01, 0.8), 2)
+    color = shade(palette(0.5 + 0.2 * cloud, "#cfc8bd", "#dbd5cb", "#e4dfd6"), 0.05 * grain)
+    chip = np.zeros(len(at), np.float32)
+    for k, (size, share) in enumerate(((0.006, 0.55), (0.013, 0.5), (0.028, 0.42))):
+        bent = warped(at, 0.03 * size, 0.5 * size, 3 + k, 3)
+        piece = cells(bent, size, 6 + k, 1.0, (1.25, 0.9, 1))
+        shown = fading(size, at.footprint)
+        here = edge(piece.border - size * (0.05 + 0.12 * piece.random(1)), at.footprint) * (piece.random(2) < share)
+        here = here * shown + 0.45 * share * (1 - shown)
+        vein = abs(fbm(bent, Spectrum(1.5 * size, 0.2 * size, 0.7, (1, 0.5, 1)), 9 + k))
+        stone = each(
+            piece.random(3),
+            shown,
+            "#5d5650",
+            "#8d7a68",
+            "#b5563f",
+            "#c99a73",
+            "#e9e2d6",
+            "#f1ece2",
+            "#a9a49c",
+            "#77857c",
+            "#4a4d50",
+        )
+        stone = tint(shade(stone, 0.05 * grain + 0.10 * np.exp(-6 * vein) - 0.03), 0.1 * (piece.random(4) - 0.5) * shown)
+        color, chip = mix(color, stone, here), np.maximum(chip, here)
+    return Look(color, 0.26 - 0.1 * chip + 0.03 * grain, 0.0, 1.2e-5 * (chip - 0.6) + 4e-6 * grain)
+
+
+WIDE_BANDS = Spectrum(0.16, 0.01, 0.85, (10, 1, 10))
+
+
+def onyx(at: Place) -> Look:
+    """Banded calcite: thin layers of honey, rust, white and grey-blue, folded as they grew, half translucent."""
+    fold = bedded(warped(at, 0.006, 0.15, 1), 0.035, 0.6, 2)
+    wide = fbm(fold, WIDE_BANDS, 4)
+    thin = fbm(fold, Spectrum(0.02, 0.0005, 1.0, (16, 1, 16), tails=0.3, patch=0.5), 5)
+    line_ = np.clip(fbm(fold, Spectrum(0.03, 0.003, 0.9, (14, 1, 14)), 6) - 1.2, 0, 1.5)
+    grain = fbm(at, Spectrum(0.008, 0.0003, 1.1, tails=0.4, patch=0.4), 7)
+    hidden = 0.23 * lost(fold, WIDE_BANDS)
+    color = averaged(
+        0.5 + 0.23 * wide + 0.07 * thin,
+        hidden,
+        "#6f7c86",
+        "#a3a9aa",
+        "#d9d2c3",
+        "#e6d6b4",
+        "#c58f4d",
+        "#a9662a",
+        "#dcc08c",
+        "#efe6d2",
+    )
+    color = mix(color, palette(0.5 + 0.3 * thin, "#f0e9dc", "#fbf6ec"), np.clip(line_, 0, 1) * 0.8)
+    color = tint(shade(color, 0.12 * thin + 0.09 * grain), 0.05 * noise(fold, 0.03, 8, (6, 1, 6)))
+    return Look(color, 0.14 + 0.03 * abs(thin) + 0.02 * grain, 0.0, 6e-6 * thin)
+
+
+def rock(at: Place) -> Look:
+    """Weathered cliff: broken faces, cracks that branch, ledges, lichen grey and rusty where water stood."""
+    beds = bedded(at, 0.015, 0.5, 1)
+    bent = warped(beds, 0.006, 0.12, 2, 5)
+    block = cells(bent, 0.16, 3, 1.0, (1.7, 0.8, 1.3))
+    tilt = (block.offset[0] * (block.random(1) - 0.5) + block.offset[1] * (block.random(2) - 0.5)) * 0.35 + 0.02 * (
+        block.random(3) - 0.5
+    )
+    torn = fbm(bent, Spectrum(0.12, 0.0012, 0.82, (1.8, 1, 1.8), tails=0.2, skew=-0.15, patch=0.5), 4)
+    crack = cracks(beds, 0.3, 0.006, 0.55, 5, 3, 0.07, (1.6, 0.9, 1))
+    grit = fbm(at, Spectrum(0.006, 0.0006, 1.0, tails=0.4, patch=0.5), 6)
+    stain = masked(bent, Spectrum(0.25, 0.003, 0.85, patch=0.4), 0.2, 7, 0.5)
+    color = palette(0.5 + 0.12 * torn + 0.35 * (block.random(4) - 0.5), "#6a6560", "#878179", "#9d978e", "#b3aea5")
+    color = mix(color, palette(0.5 + 0.2 * grit, "#7c6047", "#9c7c5b"), 0.5 * stain)
+    color = shade(color, 0.12 * grit + 0.14 * torn + 1.5 * tilt - 0.5 * np.exp(-crack.near / 0.004))
+    color = tint(mix(color, palette(0.5 + 0.2 * grit, "#2c2a28", "#3d3a36"), 0.85 * crack.cover), 0.06 * noise(bent, 0.08, 8))
+    height = tilt + 5e-3 * torn + 4e-4 * grit - 8e-3 * crack.cover
+    return Look(color, np.clip(0.84 + 0.05 * grit + 0.05 * crack.cover, 0, 1), 0.0, height)
+
+
+def fieldstone(at: Place, size: float, gap: float, corner: float, stretch: float, mortar: tuple[str, ...]) -> Look:
+    """Stones found, not cut, laid in mortar: each of another rock, its face rough and rounded to the joint."""
+    flat = at.flat
+    bent = warped(flat, 0.02 * size, 0.3 * size, 1, 5)
+    stone = pebbles(bent, size, gap, corner, 2, 0.85, (stretch, 1, 1), 0.0)
+    bed = stone.cells
+    own = flat.moved(np.stack([0 * bed.near, 0 * bed.near, bed.random(1) * 9]))  # no grain runs on from stone to stone
+    face = fbm(own, Spectrum(0.5 * size, 0.001, 0.85, (1.5, 1, 1), tails=0.2, skew=-0.15, patch=0.5), 3)
+    grit = fbm(flat, Spectrum(0.006, 0.0006, 1.0, tails=0.4, patch=0.5), 4)
+    rock_color = each(
+        0.9 * bed.random(2) + 0.05 + 0.012 * face,
+        stone.shown,
+        "#5d5a56",
+        "#7d776e",
+        "#93897a",
+        "#7f6d58",
+        "#a39680",
+        "#6b6f72",
+        "#87816f",
+    )
+    rock_color = tint(
+        shade(rock_color, 0.14 * face + 0.14 * grit + 0.5 * (bed.random(3) - 0.5) * stone.shown), 0.12 * (bed.random(4) - 0.5)
+    )
+    joint = shade(palette(0.5 + 0.2 * noise(flat, 0.06, 5), *mortar), 0.16 * grit)
+    color = mix(
+        joint, shade(rock_color, 0.15 - 0.7 * np.exp(-np.maximum(stone.inside, 0) / (0.05 * size)) * stone.shown), stone.cover
+    )
+    height = stone.cover * (0.09 * size * stone.dome + 0.014 * size * face) + 3e-4 * grit - 0.055 * size
+    return Look(color, np.clip(0.86 + 0.05 * grit - 0.05 * stone.cover, 0, 1), 0.0, height, stone.cover)
+
+
+def rock_wall(at: Place) -> Look:
+    """Rubble masonry: field stones, wider than high, in lime mortar."""
+    return fieldstone(at, 0.24, 0.024, 0.35, 1.5, ("#98917f", "#b3ac9b", "#c6bfae"))
+
+
+def cobblestone(at: Place) -> Look:
+    """Round river cobbles set in sand."""
+    return fieldstone(at, 0.11, 0.010, 0.8, 1.0, ("#302b25", "#40392f", "#514a3e"))
+
+
+def pebble_bed(at: Place) -> Look:
+    """Beach pebbles, washed smooth, in two sizes: grey, rust, white and speckled, some with a band."""
+    bent = warped(at, 0.0008, 0.02, 1)
+    small, large = pebbles(bent, 0.016, 0.001, 0.9, 2, 1.0, (1.2, 1, 1)), pebbles(bent, 0.036, 0.004, 0.85, 3, 1.0, (1, 1.2, 1))
+    on_top = (large.cells.random(1) < 0.6) & (large.inside > -0.002)
+
+    def pick(above: Array | float, below: Array | float) -> Array:
+        return np.where(on_top, above, below).astype(np.float32)
+
+    bed = [pick(large.cells.random(k), small.cells.random(k)) for k in range(2, 7)]
+    dome, cover, shown = pick(large.dome, small.dome), pick(large.cover, small.cover), fading(0.012, at.footprint)
+    speckle = fbm(at, Spectrum(0.004, 0.0004, 1.0, tails=0.5, skew=0.2, patch=0.5), 4)
+    band = abs(noise(bent, 0.03, 5, (1, 0.4, 1)) - 3 * (bed[3] - 0.5)) < 0.14
+    color = each(bed[0], shown, "#55585b", "#7d7f7f", "#a39f97", "#8b6f58", "#c2b59f", "#6f6a64", "#ddd8cd", "#93705a")
+    color = mix(color, palette(bed[1], "#cfc9bd", "#ece8df"), 0.6 * band * (bed[2] < 0.25) * shown)
+    color = tint(
+        shade(color, 0.10 * speckle * (0.4 + 1.2 * bed[4]) + 0.3 * (bed[1] - 0.5) * shown + 0.35 * dome - 0.3),
+        0.1 * (bed[2] - 0.5),
+    )
+    color = mix(palette(0.5 + 0.2 * speckle, "#37322c", "#4d463d"), color, cover)
+    height = cover * dome * pick(0.012, 0.006) + pick(0.003, 0.0) - 0.007 + 3e-5 * speckle
+    return Look(color, np.clip(0.6 + 0.04 * speckle - 0.1 * (dome - 0.7) + 0.3 * (1 - cover), 0, 1), 0.0, height)
+
+
+def gravel(at: Place) -> Look:
+    """Crushed stone: sharp pieces of all sizes, dust between them."""
+    grit = fbm(at, Spectrum(0.003, 0.0004, 1.0, tails=0.4, patch=0.4), 1)
+    dust = fbm(at, Spectrum(0.2, 0.01, 0.8), 2)
+    color, height = shade(palette(0.5 + 0.2 * dust, "#45413b", "#57534c", "#6b665e"), 0.14 * grit), 2e-4 * grit
+    for k, (size, share) in enumerate(((0.006, 0.9), (0.012, 0.7), (0.022, 0.5))):
+        piece = pebbles(warped(at, 0.03 * size, 0.5 * size, 3 + k), size, 0.05 * size, 0.15, 6 + k, 1.0)
+        bed = piece.cells
+        here = piece.cover * (bed.random(1) < share) * piece.shown + 0.6 * share * (1 - piece.shown)
+        tilt = (
+            (bed.offset[0] * (bed.random(2) - 0.5) + bed.offset[1] * (bed.random(3) - 0.5)) / size * piece.shown
+        )  # a broken face, tilted
+        stone = each(bed.random(4), piece.shown, "#6c6a68", "#8a8782", "#a5a19a", "#7a7169", "#bdb8af", "#918b84")
+        stone = shade(
+            stone,
+            0.5 * tilt + 0.14 * grit + 0.45 * (bed.random(5) - 0.5) * piece.shown + 0.9 * (np.minimum(piece.dome, 0.7) - 0.6),
+        )
+        color, height = (
+            mix(color, stone, here),
+            mix(height, size * (0.28 * piece.dome + 0.4 * tilt + 0.1 * bed.random(6)), here),
+        )
+    return Look(tint(color, 0.04 * noise(at, 0.01, 9)), np.clip(0.88 + 0.05 * grit, 0, 1), 0.0, height - 0.0035)
+
+
+def jade(at: Place) -> Look:
+    """Felted fibres of nephrite, polished: green clouds in pale green, a fine web of lighter veins."""
+    bent = warped(at, 0.005, 0.06, 1, 4)
+    cloud = fbm(bent, Spectrum(0.09, 0.001, 0.72, (1, 1.5, 1), patch=0.4), 3)
+    vein = cracks(bent, 0.045, 0.0009, 0.4, 4, 2)
+    fleck = fbm(at, Spectrum(0.004, 0.0003, 1.0, (1, 1.7, 1), tails=0.5, patch=0.5), 5)
+    dark = masked(bent, Spectrum(0.03, 0.0006, 0.85, patch=0.5), 0.05, 6, 0.5)
+    color = palette(0.5 + 0.2 * cloud, "#2b6a44", "#41815a", "#5d9a6e", "#82b188", "#a9c8a2")
+    color = mix(color, palette(0.5 + 0.2 * fleck, "#b9d3b0", "#dbe7cd"), 0.45 * vein.cover + 0.25 * np.exp(-vein.near / 0.0015))
+    color = tint(shade(color, 0.09 * fleck - 0.3 * dark), 0.06 * noise(bent, 0.04, 7), 0.03 * cloud)
+    return Look(color, 0.11 + 0.05 * vein.cover + 0.015 * abs(fleck) + 0.03 * dark, 0.0, 2e-6 * fleck - 5e-6 * vein.cover)
+
+
+def malachite(at: Place) -> Look:
+    """Copper carbonate grown in shells about many centres: rings of light and dark green, cut and polished."""
+    bent = warped(at, 0.0035, 0.03, 1, 3)
+    growth = cells(bent, 0.055, 2)
+    depth = np.stack([growth.near * (1 + 0.3 * growth.random(1)), growth.random(2) * 3, 0 * growth.near]).astype(np.float32)
+    shells = Place(depth, at.uv, at.face, at.footprint, seed=at.seed)
+    layers = Spectrum(0.012, 0.0006, 0.95, (1, 30, 1), tails=0.2, patch=0.5)
+    band = fbm(shells, layers, 3)
+    silk = fbm(at, Spectrum(0.004, 0.0003, 1.0, tails=0.4, patch=0.5), 4)
+    seam = threshold(0.0012 - growth.border, 0.0, 0.0008)
+    color = averaged(0.48 + 0.22 * band, 0.22 * lost(shells, layers), "#1c4434", "#1d5a43", "#1f7a59", "#46a07c", "#86c3a3")
+    color = tint(shade(color, 0.05 * silk - 0.35 * seam), 0.05 * noise(bent, 0.03, 5))
+    return Look(color, 0.12 + 0.02 * abs(band) + 0.05 * seam, 0.0, 2e-6 * band - 1e-5 * seam)
+
+
+def lapis(at: Place) -> Look:
+    """Lapis lazuli: deep blue grains, clouds of white calcite, flecks of golden pyrite in swarms."""
+    bent = warped(at, 0.0012, 0.012, 1, 4)
+    depth = Spectrum(0.04, 0.0005, 0.85, patch=0.5)
+    cloud = fbm(bent, depth, 2)
+    calcite = masked(bent, Spectrum(0.035, 0.0005, 0.85, (1, 2, 1), patch=0.4), 0.08, 3, 0.5)
+    swarm = np.clip(0.12 + 0.12 * noise(at, 0.04, 4), 0, 0.4)
+    fleck = cells(bent, 0.0016, 5)
+    shown = fading(0.0016, at.footprint)
+    pyrite = (fleck.random(1) < swarm) * (fleck.near < 0.0011 * fleck.random(2)) * shown + 0.04 * (1 - shown)
+    grit = fbm(at, Spectrum(0.003, 0.0003, 1.0, tails=0.4, patch=0.4), 6)
+    color = averaged(0.5 + 0.2 * cloud, 0.2 * lost(at, depth), "#1d2a5e", "#22377f", "#2d4c9c", "#5571b4")
+    color = mix(color, palette(0.5 + 0.2 * grit, "#8fa3cf", "#d5dbe6"), 0.7 * calcite)
+    color = mix(
+        tint(shade(color, 0.10 * grit), 0.05 * noise(bent, 0.02, 7)), each(fleck.random(3), shown, "#c7a560", "#e6c987"), pyrite
+    )
+    return Look(color, 0.14 + 0.04 * calcite + 0.1 * pyrite + 0.015 * grit, 0.9 * pyrite, 5e-6 * (pyrite - calcite))
+
+
+def lava(at: Place) -> Look:
+    """A skin of black rock, ropy and torn, over melt that shows red to yellow in the cracks."""
+    bent = warped(at, 0.02, 0.2, 1, 4)
+    gap = cracks(bent, 0.5, 0.034, 0.5, 2, 2, 0.06)
+    folds = Spectrum(0.06, 0.004, 0.75, (1, 0.5, 1), patch=0.4)
+    rope = abs(fbm(bent, folds, 3)) + 0.7 * lost(at, folds)
+    grit = fbm(at, Spectrum(0.012, 0.0008, 1.0, tails=0.5, skew=0.15, patch=0.5), 4)
+    heat = (
+        0.85
+        - 0.6 * mix(0.5, np.clip(gap.near / 0.012, 0, 1), fading(0.03, at.footprint))
+        + 0.12 * noise(at, 0.2, 5)
+        + 0.1 * fbm(bent, Spectrum(0.05, 0.002, 0.9), 6)
+    )
+    glow = np.exp(-gap.near / 0.012)
+    crust = shade(palette(0.4 + 0.25 * rope, "#2a2828", "#3a3736", "#524e4b"), 0.2 * grit)
+    crust = mix(crust, palette(0.5 + 0.2 * grit, "#5a1a0c", "#8a2a10"), 0.5 * glow)
+    melt = palette(heat, "#6a1407", "#a82208", "#e2500c", "#f98a1c", "#ffc24a")
+    color = mix(crust, melt, gap.cover)
+    height = (1 - gap.cover) * (0.008 * rope + 8e-4 * grit + 0.012) - 0.014
+    return Look(color, np.clip(0.8 + 0.06 * grit - 0.3 * gap.cover, 0, 1), 0.0, height)
+
+
+LOOKS = {
+    "granite": granite, "pink_granite": pink_granite, "black_granite": black_granite, "marble": marble,
+    "black_marble": black_marble, "green_marble": green_marble, "sandstone": sandstone, "limestone": limestone,
+    "slate": slate, "travertine": travertine, "basalt": basalt, "terrazzo": terrazzo, "onyx": onyx, "rock": rock,
+    "rock_wall": rock_wall, "cobblestone": cobblestone, "pebbles": pebble_bed, "gravel": gravel, "jade": jade,
+    "malachite": malachite, "lapis": lapis, "lava": lava,
+}  # fmt: skip
+METRES = {
+    "granite": 0.25, "pink_granite": 0.3, "black_granite": 0.2, "marble": 1.2, "black_marble": 1.2, "green_marble": 1.0,
+    "sandstone": 0.8, "limestone": 0.4, "slate": 0.6, "travertine": 0.5, "basalt": 0.25, "terrazzo": 0.3, "onyx": 0.6,
+    "rock": 1.2, "rock_wall": 1.8, "cobblestone": 1.0, "pebbles": 0.4, "gravel": 0.25, "jade": 0.2, "malachite": 0.2,
+    "lapis": 0.15, "lava": 1.5,
+}  # fmt: skip
