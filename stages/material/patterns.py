@@ -310,7 +310,9 @@ class Weave(NamedTuple):
 
 DRAFTS = {"plain": ((1, 0), (0, 1)), "twill": ((1, 1, 0), (0, 1, 1), (1, 0, 1)), "satin": (
     (0, 1, 1, 1, 1), (1, 1, 0, 1, 1), (1, 1, 1, 1, 0), (1, 0, 1, 1, 1), (1, 1, 1, 0, 1)), "basket": (
-    (1, 1, 0, 0), (1, 1, 0, 0), (0, 0, 1, 1), (0, 0, 1, 1))}  # fmt: skip
+    (1, 1, 0, 0), (1, 1, 0, 0), (0, 0, 1, 1), (0, 0, 1, 1)), "twill 3/1": (
+    (1, 1, 1, 0), (0, 1, 1, 1), (1, 0, 1, 1), (1, 1, 0, 1)), "twill 2/2": (
+    (1, 1, 0, 0), (0, 1, 1, 0), (0, 0, 1, 1), (1, 0, 0, 1))}  # fmt: skip
 """Row by row, whether the warp thread lies on top."""
 
 
@@ -463,3 +465,82 @@ def ripples(at: Place, length: float, wander: float, seed: int = 0) -> Ripples:
     steep = np.float32(0.7)
     crest = np.where(along < steep, -np.cos(math.pi * along / steep), np.cos(math.pi * (along - steep) / (1 - steep)))
     return Ripples((crest * strength * shown).astype(np.float32), along.astype(np.float32), shown)
+
+
+def repeats(at: Place, length: float, axis: int, multiple: int = 1) -> tuple[Array, Array, float]:
+    """Equal lengths one after another along the surface (at.uv).
+
+    Args: length metres. axis 0 across, 1 up. multiple: of how many the period holds a whole number.
+    Returns: (P,) −1 … 1 within the length; (P,) its number, a whole one; its exact length, metres.
+    """
+    count, fitted = _fitted(at.period[axis], length, multiple)
+    t = at.uv[axis] / np.float32(fitted)
+    number = np.floor(t)
+    within = (2 * (t - number) - 1).astype(np.float32)
+    return within, number - count * np.floor(number / count) if count else number, fitted
+
+
+class Loops(NamedTuple):
+    """Thread of a knit, rope or wickerwork. height: (P,) 0 in the gaps … 1 on its round back. across: (P,) −1 … 1 over the
+    thread. along: (P,) 0 … 1 from end to end of what is seen of it. ident: (P,) uint32 of that piece. seen: (P,) how much
+    of single threads the footprint shows. """
+
+    height: Array
+    across: Array
+    along: Array
+    ident: NDArray[np.uint32]
+    seen: Array
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each piece, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def knit(at: Place, width: float, height: float, seed: int = 0) -> Loops:
+    """Stocking stitch on the surface (at.uv): columns of loops, each seen as a V. width, height: of a stitch, metres."""
+    x, column, _ = repeats(at, width, 0)
+    rows, up = _fitted(at.period[1], height, 1)
+    a = abs(x)
+    t = at.uv[1] / np.float32(up) - 0.75 * a - 0.55 * a * a  # a leg rises from the middle of its column, ever steeper
+    row = np.floor(t)
+    across = 2 * (t - row) - 1
+    slim = np.clip(3.2 * a + 0.35, 0, 1) * np.clip(3.2 * (1 - a) + 0.35, 0, 1)  # where the leg dives under its neighbours
+    back = np.sqrt(np.clip(1 - (across / (0.5 + 0.47 * slim)) ** 2, 0, 1))
+    row = row - rows * np.floor(row / rows) if rows else row
+    ident = _hash(2 * column + (x > 0) + np.float32(7919) * row, at.face, seed_of(at, seed))
+    seen = fading(height / 2, at.footprint)
+    return Loops((back * (0.45 + 0.55 * slim)).astype(np.float32), across.astype(np.float32), a, ident, seen)
+
+
+def laid(at: Place, width: float, lay: float, seed: int = 0) -> Loops:
+    """Ropes side by side on the surface (at.uv), along its first axis. width: of a rope, metres. lay: from strand to strand."""
+    x, row, _ = repeats(at, width, 1)
+    columns, fitted = _fitted(at.period[0], lay, 1)
+    t = at.uv[0] / np.float32(fitted) - np.arcsin(np.clip(x, -1, 1)) * np.float32(0.9) + kernels.random_numbers(
+        _hash(row, at.face, seed_of(at, seed)), 1
+    )
+    strand = np.floor(t)
+    across = 2 * (t - strand) - 1
+    dome = np.sqrt(np.clip(1 - x * x, 0, 1))
+    back = np.sqrt(np.clip(1 - across * across, 0, 1))
+    strand = strand - columns * np.floor(strand / columns) if columns else strand
+    ident = _hash(strand + np.float32(7919) * row, at.face, seed_of(at, seed + 1))
+    return Loops((dome * (0.55 + 0.45 * back)).astype(np.float32), across.astype(np.float32), (0.5 + 0.5 * x).astype(np.float32),
+                 ident, fading(lay / 2, at.footprint))  # fmt: skip
+
+
+def wickerwork(at: Place, spacing: float, cane: float, seed: int = 0) -> Loops:
+    """Canes woven before and behind upright stakes. spacing: of the stakes, metres. cane: thickness, metres."""
+    s, stake, _ = repeats(at, spacing, 0, 2)
+    y, row, _ = repeats(at, cane, 1, 2)
+    front = np.cos(np.float32(math.pi / 2) * s) * np.where((stake + row) % 2 > 0, 1, -1)  # 1 before a stake, −1 behind one
+    back = np.sqrt(np.clip(1 - y * y, 0, 1))
+    upright = np.sqrt(np.clip(1 - (s / 0.26) ** 2, 0, 1))
+    over = (front < 0) & (upright > 0)
+    piece = row * 2 + np.float32(0.0) * stake
+    ident = _hash(np.where(over, stake * 2 + 1, piece), at.face, seed_of(at, seed))
+    height = np.where(over, 0.3 + 0.35 * upright, back * (0.62 + 0.38 * front))
+    along = np.where(over, 0.5 + 0.5 * y, 0.5 + 0.5 * front)
+    across = np.where(over, s / 0.26, y)
+    return Loops(height.astype(np.float32), across.astype(np.float32), along.astype(np.float32), ident,
+                 fading(cane, at.footprint))  # fmt: skip
