@@ -501,10 +501,10 @@ def knit(at: Place, width: float, height: float, seed: int = 0) -> Loops:
     x, column, _ = repeats(at, width, 0)
     rows, up = _fitted(at.period[1], height, 1)
     a = abs(x)
-    t = at.uv[1] / np.float32(up) - 0.75 * a - 0.55 * a * a  # a leg rises from the middle of its column, ever steeper
+    t = at.uv[1] / np.float32(up) - 0.5 * a - 0.5 * a * a  # a leg rises from the middle of its column, ever steeper
     row = np.floor(t)
     across = 2 * (t - row) - 1
-    slim = np.clip(3.2 * a + 0.35, 0, 1) * np.clip(3.2 * (1 - a) + 0.35, 0, 1)  # where the leg dives under its neighbours
+    slim = np.clip(2.6 * a + 0.25, 0, 1) * np.clip(2.6 * (1 - a) + 0.25, 0, 1)  # where the leg dives under its neighbours
     back = np.sqrt(np.clip(1 - (across / (0.5 + 0.47 * slim)) ** 2, 0, 1))
     row = row - rows * np.floor(row / rows) if rows else row
     ident = _hash(2 * column + (x > 0) + np.float32(7919) * row, at.face, seed_of(at, seed))
@@ -544,3 +544,46 @@ def wickerwork(at: Place, spacing: float, cane: float, seed: int = 0) -> Loops:
     across = np.where(over, s / 0.26, y)
     return Loops(height.astype(np.float32), across.astype(np.float32), along.astype(np.float32), ident,
                  fading(cane, at.footprint))  # fmt: skip
+
+
+class Scales(NamedTuple):
+    """Scales in rows. across: (P,) −1 … 1 over the scale. along: (P,) 0 at its free tip … 1 where it is overlapped. rim: (P,)
+    distance to its free edge, metres. under: (P,) distance from the edge of the scale that lies over it, metres. ident: (P,)
+    uint32. seen: (P,) how much of single scales the footprint shows. """
+
+    across: Array
+    along: Array
+    rim: Array
+    under: Array
+    ident: NDArray[np.uint32]
+    seen: Array
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each scale, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def scales(at: Place, width: float, height: float, seed: int = 0) -> Scales:
+    """Scales that overlap like shingles, the upper rows over the lower, on the surface (at.uv). height: of a row, metres."""
+    (columns, wide), (rows, up) = _fitted(at.period[0], width, 1), _fitted(at.period[1], height, 2)
+    u, v = at.uv[0] / np.float32(wide), at.uv[1] / np.float32(up)
+    row = np.floor(v)
+    t = v - row  # from the row's tips to the next row's
+    x = 2 * _within(u + 0.5 * (row % 2)) - 1
+    reach = 1 - np.hypot(x, 1 - t)
+    behind = reach < 0  # between two tips the row below shows
+    mine = row - behind
+    x = np.where(behind, 2 * _within(u + 0.5 * (mine % 2)) - 1, x)
+    column = np.floor(u + 0.5 * (mine % 2))
+    wrapped_row = mine - rows * np.floor(mine / rows) if rows else mine
+    column = column - columns * np.floor(column / columns) if columns else column
+    half = np.float32(wide / 2)
+    rim = half * np.where(behind, 1 - abs(x) + t, reach)
+    under = np.where(behind, -reach * half, np.float32(up) * (1.3 - t))
+    ident = _hash(column + np.float32(7919) * wrapped_row, at.face, seed_of(at, seed))
+    along = (t + behind) / 2
+    return Scales(*(a.astype(np.float32) for a in (x, along, rim, under)), ident, fading(0.7 * min(width, height), at.footprint))
+
+
+def _within(x: Array) -> Array:
+    return x - np.floor(x)

@@ -48,8 +48,8 @@ class Cloth(NamedTuple):
 
 
 CLOTHS = {
-    "denim": Cloth(("#162a4a", "#20406d", "#305c93", "#557fae"), ("#54688a", "#7c8da6"), 0.0008, "twill 3/1", 0.95, 0.24, fade=0.12),
-    "fabric": Cloth(("#9c9483", "#b4ab99", "#c4bcab"), ("#a59c8a", "#bbb2a1", "#cbc4b4"), 0.0007, stray=0.2),
+    "denim": Cloth(("#11233f", "#19335a", "#2b4d7b", "#486c97"), ("#4d6080", "#74859e"), 0.0008, "twill 3/1", 0.95, 0.15, fade=0.14),
+    "fabric": Cloth(("#9c9483", "#b4ab99", "#c4bcab"), ("#a59c8a", "#bbb2a1", "#cbc4b4"), 0.0007, slub=0.08, stray=0.15),
     "canvas": Cloth(("#ac9f82", "#c5b899", "#d8cdb2"), ("#b3a688", "#cabd9f", "#ddd3ba"), 0.0012, "basket", 0.94, 0.16, 0.3),
     "linen": Cloth(("#a69472", "#c2b18d", "#d8caa9"), ("#ae9d7b", "#cbbb98", "#e0d4b6"), 0.0006, "plain", 0.86, 0.3, 0.45, 0.1, 0.07),
     "burlap": Cloth(("#71542d", "#977545", "#b9955f"), ("#7a5c33", "#a27f4e", "#c29f6a"), 0.0022, "plain", 0.72, 0.3, 0.4, 0.16, 0.08, 1.1, 0.95),
@@ -108,8 +108,7 @@ def woven(at: Place, kind: Cloth) -> Look:
     mean = usual(weave, kind.pitch, kind.draft, kind.fill)["height"]
     fade = fbm(flat, Spectrum(0.25, 0.006, 0.85, patch=0.4), 7)
     own = 0.5 + 0.45 * (draw.random(1) - 0.5) * draw.seen + vary + kind.fade * fade
-    hidden = 0.13 * (1 - draw.seen)
-    color = mix(averaged(own, hidden, *kind.weft), averaged(own, hidden, *kind.warp), warp)
+    color = mix(palette(own, *kind.weft), palette(own, *kind.warp), warp)
     color = relieved(shade(color, 0.6 * vary + 0.5 * kind.fade * fade), rise, mean, kind.depth)
     color = tint(color, 0.08 * (draw.random(2) - 0.5) * draw.seen + 0.03 * noise(flat, 0.04, 8))
     rough = kind.roughness - 0.12 * (rise - mean) + 0.25 * vary
@@ -160,11 +159,11 @@ def silk(at: Place) -> Look:
     """Satin: long floats of fine bright threads, softly moving light, hardly a weave to be seen."""
     flat = at.flat
     cloth = woven(at, CLOTHS["silk"])
-    fold = fbm(warped(flat, 0.02, 0.15, 20, 3), Spectrum(0.18, 0.03, 0.5, (0.6, 1.4, 1)), 21)
+    fold = fbm(warped(flat, 0.01, 0.08, 20, 2), Spectrum(0.08, 0.02, 0.5, (0.5, 1.5, 1)), 21)
     streak = fbm(flat, Spectrum(0.03, 0.0005, 0.95, (0.04, 1, 1), tails=0.4, patch=0.5), 22)
-    color = shade(cloth.color, 0.16 * fold + 0.035 * streak)
+    color = shade(cloth.color, 0.14 * np.sin(1.6 * fold) + 0.05 * streak)
     rough = np.clip(0.36 - 0.05 * fold + 0.03 * streak, 0.1, 1)
-    return cloth._replace(color=color, roughness=rough, height=cloth.height + 1.5e-3 * fold)
+    return cloth._replace(color=color, roughness=rough, height=cloth.height + 8e-4 * fold)
 
 
 SETT = (("#7a1a20", 8), ("#1c2a22", 1), ("#7a1a20", 2), ("#1d3b2c", 9), ("#c9a53f", 1), ("#1d3b2c", 9), ("#7a1a20", 2),
@@ -193,8 +192,8 @@ def tartan(at: Place) -> Look:
     bands = [striped(within, at.footprint, fitted) for within, _, fitted in (repeats(at, 0.13, axis) for axis in (0, 1))]
     hair = marks(at, 0.008, 0.00009, 6, 0.8, 6.28, 9, 0.7, 0.6)
     color = shade(mix(bands[1], bands[0], warp), 1.2 * vary + 0.2 * (draw.random(1) - 0.5) * draw.seen)
-    color = relieved(color, rise, mean, kind.depth) + 0.05 * (hair.cover - 0.2) * fading(2e-4, at.footprint)
-    color = tint(np.clip(color, 0.004, 1), 0.06 * (draw.random(2) - 0.5) * draw.seen)
+    color = relieved(color, rise, mean, kind.depth) * (0.95 + 0.4 * hair.cover)
+    color = tint(color, 0.06 * (draw.random(2) - 0.5) * draw.seen)
     return Look(color, np.clip(0.9 - 0.12 * (rise - mean) + 0.2 * vary, 0, 1), 0.0, 0.3 * kind.pitch * (rise - mean), 0.3)
 
 
@@ -207,55 +206,55 @@ def wool_knit(at: Place) -> Look:
     """Stocking stitch of plied wool: columns of V-shaped loops, three plies twisted, a haze of hairs."""
     flat = at.flat
     bent = warped(flat, 0.0004, 0.02, 1, 2)
-    loops = knit(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.007, 0.0055, 3)
+    loops = knit(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.0072, 0.0054, 3)
     ply = np.cos(2 * np.pi * (1.1 * loops.across + 4.2 * loops.along)) * fading(0.0018, at.footprint)
     fibre = fbm(warped(flat, 0.0005, 0.003, 4, 2), Spectrum(0.0022, 0.0002, 1.0, (0.5, 1.6, 1), 0.4, 0.1, 0.4), 6)
     hair = marks(at, 0.012, 0.00016, 8, 0.8, 6.28, 9, 0.7, 0.7)
     wide = fbm(flat, Spectrum(0.15, 0.01, 0.8, patch=0.4), 7)
-    mean = usual(knit, 0.007, 0.0055)["height"]
+    mean = usual(knit, 0.0072, 0.0054)["height"]
     rise = thread_rise(loops, mean)
     own = 0.5 + 0.35 * (loops.random(1) - 0.5) * loops.seen + 0.10 * wide + 0.14 * fibre
     color = averaged(own, 0.1 * (1 - loops.seen), "#b7a88d", "#cdc1a8", "#ddd4bf")
     color = relieved(shade(color, 0.10 * ply + 0.09 * fibre), rise, mean, 0.95)
     color = mix(color, palette(hair.random(1), "#cfc4ac", "#ece5d6"), 0.35 * hair.cover)
     height = 0.0018 * (rise - mean) + 1.5e-4 * ply + 6e-5 * fibre + 1e-4 * hair.cover
-    return Look(tint(color, 0.04 * noise(flat, 0.03, 8)), np.clip(0.92 + 0.03 * fibre - 0.08 * (rise - mean), 0, 1), 0.0, height)
+    return Look(tint(color, 0.02 * noise(flat, 0.03, 8)), np.clip(0.92 + 0.03 * fibre - 0.08 * (rise - mean), 0, 1), 0.0, height)
 
 
 def felt(at: Place) -> Look:
     """Wool pressed without a thread: fibres in every direction, soft clouds, balls of fluff."""
     flat = at.flat
-    cloud = fbm(warped(flat, 0.002, 0.012, 1, 3), Spectrum(0.05, 0.001, 0.9, tails=0.2, patch=0.5), 2)
-    fine = fbm(warped(flat, 0.0004, 0.0016, 3, 2), Spectrum(0.003, 0.00015, 1.0, (0.6, 1.5, 1), 0.5, 0.15, 0.5), 4)
-    color = palette(0.5 + 0.10 * cloud + 0.12 * fine, "#4a5a52", "#5c6d63", "#708377")
-    height = 2e-4 * cloud + 5e-5 * fine
-    for k, tone in enumerate(("#46564e", "#64766b", "#8fa095")):
-        hair = marks(at, 0.011 - 0.002 * k, 0.00014, 10, 1.1 * k, 6.28, 6 + k, 0.6, 0.8)
-        color, height = mix(color, shade(palette(0 * fine, tone), 0.3 * (hair.random(1) - 0.5)), 0.5 * hair.cover), height + 6e-5 * hair.cover
-    color = tint(shade(color, 0.06 * cloud + 0.05 * fine), 0.05 * noise(flat, 0.01, 12))
+    cloud = fbm(warped(flat, 0.002, 0.012, 1, 3), Spectrum(0.03, 0.001, 0.9, tails=0.2, patch=0.5), 2)
+    fine = fbm(warped(flat, 0.0004, 0.0016, 3, 2), Spectrum(0.002, 0.00012, 1.0, tails=0.5, skew=0.1, patch=0.5), 4)
+    color = palette(0.5 + 0.06 * cloud + 0.10 * fine, "#4a5a52", "#5c6d63", "#708377")
+    height = 4e-5 * cloud + 3e-5 * fine
+    for k, tone in enumerate(("#4c5d54", "#66786d", "#87998d")):
+        hair = marks(at, 0.009 - 0.002 * k, 0.00022, 9, 1.1 * k, 6.28, 6 + k, 0.6, 0.9)
+        color, height = mix(color, shade(palette(0 * fine, tone), 0.3 * (hair.random(1) - 0.5)), 0.5 * hair.cover), height + 4e-5 * hair.cover
+    color = tint(shade(color, 0.03 * cloud + 0.06 * fine), 0.05 * noise(flat, 0.01, 12))
     return Look(color, np.clip(0.95 + 0.03 * fine, 0, 1), 0.0, height - 1e-4)
 
 
 def velvet(at: Place) -> Look:
     """Dense upright pile: deep where it faces you, pale where it was stroked the other way, in soft-edged swathes."""
     flat = at.flat
-    bent = warped(flat, 0.012, 0.06, 1, 4)
-    nap = fbm(bent, Spectrum(0.12, 0.003, 0.7, (0.6, 1.3, 1), patch=0.6), 2)
-    comb = fbm(bent, Spectrum(0.012, 0.0005, 0.95, (0.3, 1.6, 1), tails=0.3, patch=0.5), 3)
+    bent = warped(flat, 0.012, 0.12, 1, 2)
+    nap = fbm(bent, Spectrum(0.14, 0.03, 0.5, (0.7, 1.3, 1), patch=0.4), 2)
+    comb = fbm(flat, Spectrum(0.008, 0.0005, 1.0, (0.35, 1.6, 1), 0.4, 0.15, 0.5), 3)
     tip = fbm(flat, Spectrum(0.0012, 0.00012, 1.05, (0.8, 1.2, 1), 0.5, 0.2, 0.4), 4)
-    turned = np.tanh(1.3 * nap) + 0.3 * comb
+    turned = np.tanh(0.9 * nap) + 0.22 * comb
     spectrum = Spectrum(0.0012, 0.00012, 1.05, (0.8, 1.2, 1))
     color = averaged(
         0.42 + 0.22 * turned + 0.13 * tip, 0.13 * lost(flat, spectrum), "#3a0812", "#5a0d1c", "#7d1428", "#a62e40", "#c55a66"
     )
     color = tint(shade(color, 0.05 * tip), 0.06 * comb)
-    return Look(color, np.clip(0.72 - 0.08 * turned + 0.05 * tip, 0, 1), 0.0, 3e-4 * nap + 1e-4 * comb + 5e-5 * tip)
+    return Look(color, np.clip(0.72 - 0.08 * turned + 0.05 * tip, 0, 1), 0.0, 3e-4 * nap + 5e-5 * comb + 5e-5 * tip)
 
 
 def pile(at: Place, size: float, stops: tuple[str, ...], seed: int, depth: float) -> tuple[Array, Array, Array, Array]:
     """Tufts or loops side by side. Returns: colours (3, P); their rise about 0, random number and twist, (P,) each."""
     bent = warped(at.flat, 0.15 * size, 3 * size, seed, 2)
-    tuft = cells(bent, size, seed + 1, 0.75, (1, 1, 40))
+    tuft = cells(bent, size, seed + 1, 0.6, (1, 1, 40))
     shown = fading(size, at.footprint)
     rise = (np.clip(1 - (tuft.near / (0.72 * size)) ** 2, 0, 1) - 0.55) * shown
     angle = np.arctan2(tuft.offset[1], tuft.offset[0])
@@ -271,7 +270,7 @@ def carpet(at: Place) -> Look:
     trod = fbm(warped(flat, 0.02, 0.1, 5, 3), Spectrum(0.3, 0.006, 0.8, patch=0.5), 6)
     fibre = fbm(warped(flat, 0.0005, 0.003, 7, 2), Spectrum(0.003, 0.0002, 1.0, (1, 1, 1), 0.5, 0.1, 0.4), 8)
     color = tint(shade(color, 0.16 * fibre + 0.10 * turn + 0.08 * trod), 0.10 * own + 0.03 * fibre)
-    height = 0.0022 * rise + 0.0012 * own + 2e-4 * turn + 2e-4 * fibre + 0.001 * trod
+    height = 0.0013 * rise + 0.0007 * own + 2e-4 * turn + 1.6e-4 * fibre + 0.001 * trod
     return Look(color, np.clip(0.95 + 0.03 * fibre - 0.06 * rise, 0, 1), 0.0, height)
 
 
@@ -282,7 +281,7 @@ def towel(at: Place) -> Look:
     fibre = fbm(warped(flat, 0.0004, 0.002, 7, 2), Spectrum(0.002, 0.00015, 1.0, (0.6, 1.4, 1), 0.4, -0.1, 0.4), 8)
     wide = fbm(flat, Spectrum(0.08, 0.003, 0.9, patch=0.4), 9)
     color = tint(shade(color, 0.07 * fibre + 0.07 * turn + 0.03 * wide), 0.06 * own)
-    height = 0.0014 * rise + 6e-4 * own + 2e-4 * turn + 6e-5 * fibre + 4e-4 * wide
+    height = 6e-4 * rise + 2e-4 * own + 9e-5 * turn + 4e-5 * fibre + 2e-4 * wide
     return Look(color, np.clip(0.94 + 0.03 * fibre - 0.06 * rise, 0, 1), 0.0, height)
 
 
@@ -292,14 +291,14 @@ def corduroy(at: Place) -> Look:
     bent = strayed(flat, 0.003, 0.0002, 1)
     across, wale, pitch = repeats(bent, 0.0032, 0)
     shown = fading(pitch / 2, at.footprint)
-    back = (np.sqrt(np.clip(1 - np.abs(across) ** 2.6, 0, 1)) - 0.86) * shown
+    back = (np.sqrt(np.clip(1 - across * across, 0, 1)) - 0.785) * shown
     pile_of = fbm(flat, Spectrum(0.0012, 0.00012, 1.0, (0.6, 1.5, 1), 0.5, -0.1, 0.4), 3)
-    cross = fbm(flat, Spectrum(0.006, 0.0006, 0.95, (1.6, 0.5, 1), 0.3, patch=0.5), 4)
+    cross = fbm(flat, Spectrum(0.0022, 0.0004, 0.95, (1.4, 0.6, 1), 0.3, patch=0.5), 4)
     worn = fbm(flat, Spectrum(0.12, 0.004, 0.8, (1, 1.5, 1), patch=0.5), 5)
-    color = palette(0.52 + 0.12 * pile_of + 0.09 * cross + 0.10 * worn, "#5c3a1f", "#7c5430", "#9c7347", "#b58e60")
-    color = color * np.maximum(1 + 1.15 * back, 0.05)
-    color = tint(shade(color, 0.08 * pile_of + 0.05 * cross), 0.04 * noise(flat, 0.02, 6))
-    height = 0.0011 * back + 8e-5 * pile_of + 8e-5 * cross
+    color = palette(0.45 + 0.10 * pile_of + 0.03 * cross + 0.04 * worn + 0.12 * back, "#4a3a2a", "#6a543d", "#8a7054", "#a58b6e")
+    color = color * np.maximum(1 + 0.95 * back, 0.05)
+    color = tint(shade(color, 0.08 * pile_of + 0.02 * cross), 0.04 * noise(flat, 0.02, 6))
+    height = 0.0010 * back + 4e-5 * pile_of + 4e-5 * cross
     return Look(color, np.clip(0.9 - 0.12 * back + 0.03 * pile_of, 0, 1), 0.0, height)
 
 
@@ -340,15 +339,17 @@ def straw(at: Place) -> Look:
     """Threshed stalks lying over each other every way: hollow, ribbed along, some split, some with a node, dark beneath."""
     flat = at.flat
     grit = fbm(flat, Spectrum(0.004, 0.0004, 1.0, tails=0.4, patch=0.4), 1)
-    color, height = palette(0.4 + 0.2 * grit, "#4a3717", "#6b5226", "#8a6c38"), -0.008 + 4e-4 * grit
+    lean = np.where(noise(flat, 0.03, 20) > 0, flat.p[1], -flat.p[1])
+    deep = fbm(flat.moved(np.stack([lean, 0 * lean, 0 * lean])), Spectrum(0.012, 0.0015, 1.0, (0.5, 9, 1), 0.3, patch=0.4), 21)
+    color, height = palette(0.42 + 0.2 * deep + 0.05 * grit, "#4f3a17", "#8a6a33", "#b58f4c", "#cda968"), -0.007 + 8e-4 * deep
     for k in range(4):
-        stalk = marks(at, 0.15, 0.0044, 12, 0.7 + 0.9 * k, 2.6, 2 + k, 0.5, 0.08)
+        stalk = marks(at, 0.12, 0.0048, 9, 0.7 + 0.9 * k, 2.6, 2 + k, 0.5, 0.08)
         inside = abs(stalk.across) < 2
         side = np.where(inside, stalk.across, 0)
         rib = np.cos(np.pi * (4 * side + 3 * stalk.random(3))) * fading(0.001, at.footprint)
         node = np.exp(-(((stalk.along - 1.4 * (stalk.random(4) - 0.5)) / 0.012) ** 2)) * (stalk.random(5) < 0.5)
         tone = each(stalk.random(1), 1.0, "#a3803c", "#c39c50", "#d8b568", "#e2c684", "#b58e48", "#ead6a2", "#93743a")
-        tone = shade(tone, 0.09 * rib + 0.07 * grit - 0.45 * side * side + 0.12 * (k - 2.4) - 0.5 * node + 0.1)
+        tone = shade(tone, 0.09 * rib + 0.07 * grit - 0.45 * (side * side - 0.33) + 0.10 * (k - 2.4) - 0.5 * node)
         color = mix(color, tint(tone, 0.1 * (stalk.random(2) - 0.5)), stalk.cover)
         height = mix(height, -0.005 + 0.0028 * k + 0.0016 * np.sqrt(np.clip(1 - side * side, 0, 1)) + 3e-4 * node, stalk.cover)
     return Look(color, np.clip(0.58 + 0.05 * grit - 6 * height, 0, 1), 0.0, height)
@@ -360,7 +361,7 @@ LOOKS = {
     "rope": rope, "wicker": wicker, "straw": straw,
 }  # fmt: skip
 METRES = {
-    "denim": 0.12, "fabric": 0.08, "canvas": 0.12, "linen": 0.08, "burlap": 0.2, "wool": 0.12, "wool knit": 0.15, "felt": 0.1,
-    "velvet": 0.25, "silk": 0.2, "carpet": 0.25, "corduroy": 0.12, "towel": 0.12, "tartan": 0.26, "rope": 0.2, "wicker": 0.3,
+    "denim": 0.12, "fabric": 0.08, "canvas": 0.12, "linen": 0.08, "burlap": 0.2, "wool": 0.12, "wool knit": 0.15, "felt": 0.06,
+    "velvet": 0.25, "silk": 0.08, "carpet": 0.25, "corduroy": 0.12, "towel": 0.12, "tartan": 0.26, "rope": 0.2, "wicker": 0.3,
     "straw": 0.4,
 }  # fmt: skip
