@@ -587,3 +587,47 @@ def scales(at: Place, width: float, height: float, seed: int = 0) -> Scales:
 
 def _within(x: Array) -> Array:
     return x - np.floor(x)
+
+
+class Hexagons(NamedTuple):
+    """Honeycomb. border: (P,) distance to the wall's middle, metres. x, y: (P,) from the middle, metres. ident: (P,) uint32.
+    seen: (P,) how much of single cells the footprint shows. """
+
+    border: Array
+    x: Array
+    y: Array
+    ident: NDArray[np.uint32]
+    seen: Array
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each cell, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def hexagons(at: Place, width: float, seed: int = 0) -> Hexagons:
+    """Regular hexagons on the surface (at.uv), two sides upright. width: from wall to wall, metres."""
+    (columns, wide), (pairs, tall) = _fitted(at.period[0], width, 1), _fitted(at.period[1], math.sqrt(3) * width, 1)
+    u, v = at.uv[0] / np.float32(wide), at.uv[1] / np.float32(tall)
+    best: Array = np.full(len(at), 9.0, np.float32)
+    x = y = column = row = np.zeros(len(at), np.float32)
+    for half in (0.0, 0.5):
+        i, j = np.floor(u + half) - half + 0.5, np.floor(v + half) - half + 0.5
+        dx, dy = (u - i) * np.float32(width), (v - j) * np.float32(math.sqrt(3) * width)
+        away = np.hypot(dx, dy)
+        closer = away < best
+        best, x, y = np.where(closer, away, best), np.where(closer, dx, x), np.where(closer, dy, y)
+        column, row = np.where(closer, i, column), np.where(closer, j, row)
+    slanted = np.float32(math.sqrt(3) / 2) * abs(y) + abs(x) / 2
+    column = column - columns * np.floor(column / columns) if columns else column
+    row = row - pairs * np.floor(row / pairs) if pairs else row
+    border = np.float32(width / 2) - np.maximum(abs(x), slanted)
+    ident = _hash(2 * column + np.float32(7919) * 2 * row, at.face, seed_of(at, seed))
+    return Hexagons(border.astype(np.float32), x, y, ident, fading(width / 2, at.footprint))
+
+
+def strands(at: Place, mark: Marks, width: float, count: float, seed: int = 0) -> Array:
+    """Fine lines along strokes, mean 0, deviation 1: hairs of a lock, barbs, fibres. width: of the strokes, metres. count: of
+    lines over a stroke's width. Returns: (P,). """
+    p = np.stack([np.float32(count / 2) * mark.across, 1.5 * mark.along, 97 * mark.random(seed)]).astype(np.float32)
+    lines = Place(p, p[:2], at.face, at.footprint * np.float32(count / width), seed=at.seed)
+    return 0.75 * noise(lines, 1.0, seed) + 0.65 * noise(lines, 0.5, seed + 1, (1, 3, 1))

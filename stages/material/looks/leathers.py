@@ -84,7 +84,7 @@ def suede(at: Place) -> Look:
     nap = fbm(bent, Spectrum(0.06, 0.004, 0.75, (0.8, 1.2, 1), patch=0.6), 2)
     stroke = marks(at, 0.05, 0.006, 3, 0.9, 1.6, 3, 0.6, 0.3)
     swept = (stroke.random(1) - 0.5) * stroke.cover
-    spectrum = Spectrum(0.0022, 0.00012, 1.0, (0.6, 1.4, 1), 0.5, 0.1, 0.5)
+    spectrum = Spectrum(0.0022, 0.00012, 1.0, (0.8, 1.2, 1), 0.4, 0.1, 0.3)
     fibre = fbm(at, spectrum, 5)
     pill = fbm(at, Spectrum(0.006, 0.0006, 1.0, tails=0.5, skew=-0.15, patch=0.5), 6)
     lay = 0.10 * nap + 0.22 * swept
@@ -100,12 +100,12 @@ def snake(at: Place) -> Look:
     skin = scales(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.0056, 0.0042, 2)
     middle = bent.p[:2] - np.stack([0.0028 * skin.across, 0.0084 * skin.along - 0.003]) * skin.seen  # a scale has one colour
     spread = [np.cos(np.pi * repeats(Place(bent.p, middle, at.face, at.footprint, at.period), length, axis)[0]) for axis, length in enumerate((0.055, 0.042))]
-    saddle = 0.75 * (abs(spread[0]) ** 0.8 * np.sign(spread[0]) + spread[1]) + 0.3 * noise(bent, 0.03, 4) + 0.2 * (skin.random(1) - 0.5) * skin.seen
+    saddle = 0.75 * (abs(spread[0]) ** 0.8 * np.sign(spread[0]) + spread[1]) + 0.4 * noise(bent, 0.03, 4) + 0.2 * (skin.random(1) - 0.5) * skin.seen
     fine = fbm(flat, Spectrum(0.0012, 0.00012, 1.0, (0.7, 1.6, 1), 0.4, -0.15, 0.4), 5)
     rim = np.exp(-np.clip(skin.rim, 0, 1) / 0.0003) * skin.seen
     shadow = np.exp(-np.clip(skin.under, 0, 1) / 0.0005) * skin.seen
     keel = np.exp(-((skin.across / 0.10) ** 2)) * skin.seen
-    dark, border = threshold(saddle, 0.3, 0.1), np.exp(-(((saddle - 0.3) / 0.22) ** 2))
+    dark, border = threshold(saddle, 0.12, 0.1), np.exp(-(((saddle - 0.12) / 0.16) ** 2))
     tone = 0.5 + 0.25 * (skin.random(2) - 0.5) * skin.seen + 0.10 * fine
     color = mix(palette(tone, "#8d7c58", "#b3a077", "#cdbd97"), palette(tone, "#4a3820", "#6a5030", "#836843"), dark)
     color = mix(color, palette(tone, "#241d14", "#3a2f20"), 0.85 * border)
@@ -144,7 +144,7 @@ def crocodile(at: Place) -> Look:
     shown = fading(size, at.footprint)
     sides = 0.0105 - abs(plate.x), 0.00725 - abs(plate.y)
     near = np.clip(0.0014 - np.log(sum(np.exp(-np.clip(side, 0, 0.02) / 0.0014) for side in sides)) * 0.0014 - 0.0014, 0, 1)
-    dome = 0.62 + (np.sqrt(np.clip(1 - (1 - np.clip((near - 0.0006) / 0.0042, 0, 1)) ** 2, 0, 1)) - 0.62) * shown
+    dome = 0.62 + (np.sqrt(np.clip(1 - (1 - np.clip((near - 0.0006) / 0.0058, 0, 1)) ** 2, 0, 1)) - 0.62) * shown
     cover = 0.86 + (threshold(plate.border, 0.0006, np.maximum(0.0003, 0.5 * at.footprint)) - 0.86) * shown
     own = (plate.random(1) - 0.5) * shown
     wrinkle = cracks(bent, 0.006, 0.00035, 0.45, 4, 2, 0.12)

@@ -78,6 +78,7 @@ def knots(at: Place, share: float) -> Knots:
     outside = found.near - radius
     has = radius > 0
     push = np.where(has, 0.55 * radius * np.exp(-((found.near / np.maximum(2.4 * radius, 1e-4)) ** 2)), 0)
+    push = push * np.clip(found.border / 0.03, 0, 1)  # nothing at the cell's border
     return Knots(edge(-outside, at.footprint) * has, np.exp(-((outside / 0.0012) ** 2)) * has, found.near, push)
 
 
@@ -89,8 +90,8 @@ def timber(at: Place, kind: Timber) -> Look:
         x = np.float32(width / (2 * math.pi)) * np.sin(np.float32(2 * math.pi / width) * x)
     lazy = at if at.period[1] else at.moved(np.stack([0 * y, -0.85 * y, 0 * y]))  # figure drawn out along the grain
     knot = knots(at, kind.knots) if kind.knots else None
-    wander = fbm(lazy, Spectrum(0.12, 0.01, 0.5, (1, 4, 1)), 1)
-    deep = fbm(at, Spectrum(0.2, 0.05, 0.5, (1, 4, 1)), 2)
+    wander = fbm(lazy, Spectrum(0.12, 0.015, 0.38, (1, 6, 1)), 1)
+    deep = fbm(at, Spectrum(0.2, 0.05, 0.5, (1, 5, 1)), 2)
     radius = np.hypot(x + np.float32(0.04) + kind.figure * wander, z + np.float32(0.11) + kind.figure * deep)
     radius = radius + (knot.bend if knot else 0)
     years = radius / kind.ring + 0.8 * noise(at, 0.03, 3, (1, 8, 1))
@@ -114,18 +115,19 @@ def timber(at: Place, kind: Timber) -> Look:
         heart = 0.5 + 0.35 * np.cos(knot.near / 0.0022 + 1.5 * noise(at, 0.01, 8)) * fading(0.007, at.footprint) - 0.2 * fibre
         color = mix(color, palette(heart, "#5d3218", "#8a5229", "#b17a45"), 0.9 * knot.inside)
         color = shade(color, -0.9 * knot.rim - 8 * knot.bend)
-    color = tint(color, 0.05 * noise(at, 0.05, 8, (1, 6, 1)) + 0.03 * band)
+    color = tint(color, 0.03 * noise(at, 0.05, 8, (1, 6, 1)) + 0.03 * band)
     return Look(color, rough, 0.0, 2e-5 * fibre - 1.2e-4 * pore - 4e-5 * season)
 
 
 def weathered(at: Place) -> Look:
     """Barn wood after decades: silver grey, spring wood washed out between raised latewood, checks along the grain."""
-    bent = warped(at, 0.0015, 0.04, 31, 3)
+    bent = warped(at, 0.0006, 0.04, 31, 2)
     wood = timber(bent, Timber(("#a49e94", "#8f897f", "#6d675f"), 0.0048, 0.55, 0.5, 0.0004, 0.012, 0.3, 0, 0.16, 0.85))
-    check = cracks(bent, 0.016, 0.0016, 0.16, 32, 3, 0.05, (1, 18, 1))
+    check = cracks(bent, 0.016, 0.0016, 0.16, 32, 3, 0.02, (1, 18, 1))
     fibre = fbm(at, Spectrum(0.004, 0.0003, 1.0, (1, 30, 1), 0.5, -0.2, 0.5), 33)
     stain = fbm(at, Spectrum(0.2, 0.004, 0.8, (1, 3, 1), patch=0.5), 34)
-    color = tint(shade(wood.color, 0.16 * fibre + 0.12 * stain), 0.05 * stain)
+    grey = np.array([[0.2126, 0.7152, 0.0722]], np.float32) @ wood.color * np.array([[1.03], [1.0], [0.95]], np.float32)
+    color = tint(shade(mix(wood.color, grey, 0.75), 0.14 * fibre + 0.08 * stain), 0.03 * stain)
     color = mix(color, palette(0.5 + 0.2 * fibre, "#2b2723", "#3d3833"), 0.92 * check.cover)
     groove = np.exp(-check.near / 0.0008)
     height = 6 * np.asarray(wood.height) + 9e-5 * fibre - 0.0016 * check.cover - 1.5e-4 * groove + 3e-4 * stain
@@ -134,8 +136,8 @@ def weathered(at: Place) -> Look:
 
 def charred(at: Place) -> Look:
     """Timber after a fire: black, split into alligator scales across and along the grain, silver sheen, a little ash."""
-    bent = warped(at, 0.0025, 0.03, 1, 4)
-    block = pebbles(bent, 0.024, 0.0022, 0.22, 2, 0.6, (0.85, 1.5, 1))
+    bent = warped(at, 0.0012, 0.03, 1, 4)
+    block = pebbles(bent, 0.024, 0.0022, 0.22, 2, 0.45, (0.85, 1.45, 1))
     fibre = fbm(bent, Spectrum(0.004, 0.0003, 1.0, (1, 14, 1), 0.4, -0.2, 0.4), 3)
     split = cracks(bent, 0.013, 0.0008, 0.4, 4, 2, 0.06, (0.8, 1.4, 1)).cover
     own = (block.cells.random(1) - 0.5) * block.shown
@@ -170,9 +172,9 @@ def boards(at: Place, wood: Substance, width: float = 0.12, length: float = 1.2)
     shift = np.stack([bond.random(1) * 0.3 - 0.15, bond.random(2) * 3, bond.random(3) * 0.2]).astype(np.float32)
     own = np.stack([bond.y, bond.x, 0 * bond.x]) + shift
     look = wood(Place(own, at.uv, at.face, at.footprint, seed=at.seed))
-    worn = bond.border + 0.0006 * noise(at.flat, 0.01, 12)
+    worn = bond.border + 0.0003 * noise(at.flat, 0.01, 12)
     gap = 1 - threshold(worn, 0.001, np.maximum(0.0005, 0.5 * at.footprint))
-    color = shade(look.color, 0.25 * (bond.random(4) - 0.5) - 1.6 * gap)
+    color = shade(look.color, 0.38 * (bond.random(4) - 0.5) - 1.6 * gap)
     color = tint(color, 0.12 * (bond.random(5) - 0.5))
     height = look.height - 0.0015 * gap - 0.0004 * threshold(0.004 - bond.border, 0.0, 0.004)
     return Look(color, np.clip(look.roughness + 0.2 * gap, 0, 1), 0.0, height)
@@ -196,7 +198,7 @@ def bamboo(at: Place) -> Look:
     shown = fading(width / 2, at.footprint)
     own = lane.random(2) - 0.5
     color = palette(0.5 + 0.5 * own + 0.10 * stain + 0.06 * fibre, "#a58a45", "#bfa45c", "#cfb872", "#b5ad68", "#dcc98e")
-    color = mix(color, palette(0.5 + 0.1 * fibre, "#d9d2b4"), 0.5 * np.exp(-below / 0.014))
+    color = mix(color, palette(0.5 + 0.1 * fibre, "#d9d2b4"), 0.35 * np.exp(-below / 0.010))
     color = mix(color, palette(0.5 + 0.2 * fibre, "#5a4220", "#7c6234"), 0.75 * np.exp(-(((above - 0.0015) / 0.0014) ** 2)) + 0.35 * np.exp(-above / 0.007))
     color = shade(color, 0.06 * fibre + 0.05 * stain - 0.5 * speck - 0.75 * ((1 - dome) ** 2 - 0.1) * shown - 1.2 * (abs(side) > 0.97) * shown)
     ridge = 0.0016 * np.exp(-((away / 0.004) ** 2)) - 0.0012 * np.exp(-(((above - 0.0015) / 0.0012) ** 2))
@@ -206,8 +208,8 @@ def bamboo(at: Place) -> Look:
 
 def bark(at: Place) -> Look:
     """An old trunk: long ridges that part and join round deep furrows, split across into plates, flaking, with lichen."""
-    bent = warped(at, 0.007, 0.06, 1, 5)
-    ridge = cells(bent, 0.032, 2, 0.9, (1, 3.2, 1))
+    bent = warped(at, 0.0045, 0.05, 1, 4)
+    ridge = cells(bent, 0.03, 2, 0.9, (1, 4.5, 1))
     shown = fading(0.03, at.footprint)
     layer = fbm(bent, Spectrum(0.02, 0.0008, 0.95, (1, 2.2, 1), 0.3, -0.15, 0.4), 3)
     grit = fbm(at, Spectrum(0.004, 0.0003, 1.05, (1, 1.8, 1), 0.5, -0.2, 0.5), 4)
@@ -246,7 +248,7 @@ def panel(at: Place, length: float, width: float, layers: int, *stops: str) -> L
     flat = at.flat
     grit = fbm(flat, Spectrum(0.004, 0.0004, 1.0, tails=0.5, skew=-0.2, patch=0.4), 1)
     color, height = palette(0.3 + 0.15 * grit, *stops), -2e-4 + 3e-5 * grit
-    bent = warped(flat, 0.06 * width, 0.7 * width, 2, 3)
+    bent = warped(flat, 0.025 * width, 0.7 * width, 2, 3)
     ragged = Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed)
     whole = fading(1.5 * width, at.footprint)
     for k in range(layers):
@@ -254,7 +256,7 @@ def panel(at: Place, length: float, width: float, layers: int, *stops: str) -> L
         side = np.where(abs(flake.across) < 2, flake.across, 0)
         here = (abs(flake.across) < 2) * edge((1.02 - flake.along**8 - abs(side)) * 0.5 * width, at.footprint) * whole + 0.6 * (1 - whole)
         grain = (np.sin(9 * side + 5 * flake.random(2) + 0.8 * grit) + np.sin(23 * side + 9 * flake.random(3) + 3 * flake.along)) * fading(0.15 * width, at.footprint)
-        tone = shade(each(flake.random(1), whole, *stops), 0.05 * grain + 0.08 * grit)
+        tone = shade(each(flake.random(1), whole, *stops), 0.09 * grain + 0.08 * grit)
         shadow = np.exp(-np.clip(1 - abs(side), 0, 1) / 0.10) * whole
         color = mix(color, tint(shade(tone, -0.25 * shadow), 0.12 * (flake.random(4) - 0.5)), here)
         height = mix(height, 1e-4 * k + 1e-4 * side * (flake.random(5) - 0.5) + 6e-6 * grain + 8e-6 * grit, here)
@@ -288,6 +290,6 @@ LOOKS: dict[str, Substance] = {
     "bamboo": bamboo, "bark": bark, "cork": cork, "osb": osb, "chipboard": chipboard, "plywood": plywood,
 }  # fmt: skip
 METRES = {
-    **dict.fromkeys(SOLID, 0.5), **{f"{name} boards": 0.96 for name in SOLID},
+    **dict.fromkeys(SOLID, 0.36), **{f"{name} boards": 0.96 for name in SOLID},
     "weathered wood": 0.4, "charred wood": 0.3, "bamboo": 0.42, "bark": 0.4, "cork": 0.08, "osb": 0.4, "chipboard": 0.06, "plywood": 0.6,
 }  # fmt: skip
