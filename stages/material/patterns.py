@@ -310,7 +310,9 @@ class Weave(NamedTuple):
 
 DRAFTS = {"plain": ((1, 0), (0, 1)), "twill": ((1, 1, 0), (0, 1, 1), (1, 0, 1)), "satin": (
     (0, 1, 1, 1, 1), (1, 1, 0, 1, 1), (1, 1, 1, 1, 0), (1, 0, 1, 1, 1), (1, 1, 1, 0, 1)), "basket": (
-    (1, 1, 0, 0), (1, 1, 0, 0), (0, 0, 1, 1), (0, 0, 1, 1))}  # fmt: skip
+    (1, 1, 0, 0), (1, 1, 0, 0), (0, 0, 1, 1), (0, 0, 1, 1)), "twill 3/1": (
+    (1, 1, 1, 0), (0, 1, 1, 1), (1, 0, 1, 1), (1, 1, 0, 1)), "twill 2/2": (
+    (1, 1, 0, 0), (0, 1, 1, 0), (0, 0, 1, 1), (1, 0, 0, 1))}  # fmt: skip
 """Row by row, whether the warp thread lies on top."""
 
 
@@ -463,3 +465,169 @@ def ripples(at: Place, length: float, wander: float, seed: int = 0) -> Ripples:
     steep = np.float32(0.7)
     crest = np.where(along < steep, -np.cos(math.pi * along / steep), np.cos(math.pi * (along - steep) / (1 - steep)))
     return Ripples((crest * strength * shown).astype(np.float32), along.astype(np.float32), shown)
+
+
+def repeats(at: Place, length: float, axis: int, multiple: int = 1) -> tuple[Array, Array, float]:
+    """Equal lengths one after another along the surface (at.uv).
+
+    Args: length metres. axis 0 across, 1 up. multiple: of how many the period holds a whole number.
+    Returns: (P,) −1 … 1 within the length; (P,) its number, a whole one; its exact length, metres.
+    """
+    count, fitted = _fitted(at.period[axis], length, multiple)
+    t = at.uv[axis] / np.float32(fitted)
+    number = np.floor(t)
+    within = (2 * (t - number) - 1).astype(np.float32)
+    return within, number - count * np.floor(number / count) if count else number, fitted
+
+
+class Loops(NamedTuple):
+    """Thread of a knit, rope or wickerwork. height: (P,) 0 in the gaps … 1 on its round back. across: (P,) −1 … 1 over the
+    thread. along: (P,) 0 … 1 from end to end of what is seen of it. ident: (P,) uint32 of that piece. seen: (P,) how much
+    of single threads the footprint shows. """
+
+    height: Array
+    across: Array
+    along: Array
+    ident: NDArray[np.uint32]
+    seen: Array
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each piece, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def knit(at: Place, width: float, height: float, seed: int = 0) -> Loops:
+    """Stocking stitch on the surface (at.uv): columns of loops, each seen as a V. width, height: of a stitch, metres."""
+    x, column, _ = repeats(at, width, 0)
+    rows, up = _fitted(at.period[1], height, 1)
+    a = abs(x)
+    t = at.uv[1] / np.float32(up) - 0.5 * a - 0.5 * a * a  # a leg rises from the middle of its column, ever steeper
+    row = np.floor(t)
+    across = 2 * (t - row) - 1
+    slim = np.clip(2.6 * a + 0.25, 0, 1) * np.clip(2.6 * (1 - a) + 0.25, 0, 1)  # where the leg dives under its neighbours
+    back = np.sqrt(np.clip(1 - (across / (0.5 + 0.47 * slim)) ** 2, 0, 1))
+    row = row - rows * np.floor(row / rows) if rows else row
+    ident = _hash(2 * column + (x > 0) + np.float32(7919) * row, at.face, seed_of(at, seed))
+    seen = fading(height / 2, at.footprint)
+    return Loops((back * (0.45 + 0.55 * slim)).astype(np.float32), across.astype(np.float32), a, ident, seen)
+
+
+def laid(at: Place, width: float, lay: float, seed: int = 0) -> Loops:
+    """Ropes side by side on the surface (at.uv), along its first axis. width: of a rope, metres. lay: from strand to strand."""
+    x, row, _ = repeats(at, width, 1)
+    columns, fitted = _fitted(at.period[0], lay, 1)
+    t = at.uv[0] / np.float32(fitted) - np.arcsin(np.clip(x, -1, 1)) * np.float32(0.9) + kernels.random_numbers(
+        _hash(row, at.face, seed_of(at, seed)), 1
+    )
+    strand = np.floor(t)
+    across = 2 * (t - strand) - 1
+    dome = np.sqrt(np.clip(1 - x * x, 0, 1))
+    back = np.sqrt(np.clip(1 - across * across, 0, 1))
+    strand = strand - columns * np.floor(strand / columns) if columns else strand
+    ident = _hash(strand + np.float32(7919) * row, at.face, seed_of(at, seed + 1))
+    return Loops((dome * (0.55 + 0.45 * back)).astype(np.float32), across.astype(np.float32), (0.5 + 0.5 * x).astype(np.float32),
+                 ident, fading(lay / 2, at.footprint))  # fmt: skip
+
+
+def wickerwork(at: Place, spacing: float, cane: float, seed: int = 0) -> Loops:
+    """Canes woven before and behind upright stakes. spacing: of the stakes, metres. cane: thickness, metres."""
+    s, stake, _ = repeats(at, spacing, 0, 2)
+    y, row, _ = repeats(at, cane, 1, 2)
+    front = np.cos(np.float32(math.pi / 2) * s) * np.where((stake + row) % 2 > 0, 1, -1)  # 1 before a stake, −1 behind one
+    back = np.sqrt(np.clip(1 - y * y, 0, 1))
+    upright = np.sqrt(np.clip(1 - (s / 0.26) ** 2, 0, 1))
+    over = (front < 0) & (upright > 0)
+    piece = row * 2 + np.float32(0.0) * stake
+    ident = _hash(np.where(over, stake * 2 + 1, piece), at.face, seed_of(at, seed))
+    height = np.where(over, 0.3 + 0.35 * upright, back * (0.62 + 0.38 * front))
+    along = np.where(over, 0.5 + 0.5 * y, 0.5 + 0.5 * front)
+    across = np.where(over, s / 0.26, y)
+    return Loops(height.astype(np.float32), across.astype(np.float32), along.astype(np.float32), ident,
+                 fading(cane, at.footprint))  # fmt: skip
+
+
+class Scales(NamedTuple):
+    """Scales in rows. across: (P,) −1 … 1 over the scale. along: (P,) 0 at its free tip … 1 where it is overlapped. rim: (P,)
+    distance to its free edge, metres. under: (P,) distance from the edge of the scale that lies over it, metres. ident: (P,)
+    uint32. seen: (P,) how much of single scales the footprint shows. """
+
+    across: Array
+    along: Array
+    rim: Array
+    under: Array
+    ident: NDArray[np.uint32]
+    seen: Array
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each scale, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def scales(at: Place, width: float, height: float, seed: int = 0) -> Scales:
+    """Scales that overlap like shingles, the upper rows over the lower, on the surface (at.uv). height: of a row, metres."""
+    (columns, wide), (rows, up) = _fitted(at.period[0], width, 1), _fitted(at.period[1], height, 2)
+    u, v = at.uv[0] / np.float32(wide), at.uv[1] / np.float32(up)
+    row = np.floor(v)
+    t = v - row  # from the row's tips to the next row's
+    x = 2 * _within(u + 0.5 * (row % 2)) - 1
+    reach = 1 - np.hypot(x, 1 - t)
+    behind = reach < 0  # between two tips the row below shows
+    mine = row - behind
+    x = np.where(behind, 2 * _within(u + 0.5 * (mine % 2)) - 1, x)
+    column = np.floor(u + 0.5 * (mine % 2))
+    wrapped_row = mine - rows * np.floor(mine / rows) if rows else mine
+    column = column - columns * np.floor(column / columns) if columns else column
+    half = np.float32(wide / 2)
+    rim = half * np.where(behind, 1 - abs(x) + t, reach)
+    under = np.where(behind, -reach * half, np.float32(up) * (1.3 - t))
+    ident = _hash(column + np.float32(7919) * wrapped_row, at.face, seed_of(at, seed))
+    along = (t + behind) / 2
+    return Scales(*(a.astype(np.float32) for a in (x, along, rim, under)), ident, fading(0.7 * min(width, height), at.footprint))
+
+
+def _within(x: Array) -> Array:
+    return x - np.floor(x)
+
+
+class Hexagons(NamedTuple):
+    """Honeycomb. border: (P,) distance to the wall's middle, metres. x, y: (P,) from the middle, metres. ident: (P,) uint32.
+    seen: (P,) how much of single cells the footprint shows. """
+
+    border: Array
+    x: Array
+    y: Array
+    ident: NDArray[np.uint32]
+    seen: Array
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each cell, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def hexagons(at: Place, width: float, seed: int = 0) -> Hexagons:
+    """Regular hexagons on the surface (at.uv), two sides upright. width: from wall to wall, metres."""
+    (columns, wide), (pairs, tall) = _fitted(at.period[0], width, 1), _fitted(at.period[1], math.sqrt(3) * width, 1)
+    u, v = at.uv[0] / np.float32(wide), at.uv[1] / np.float32(tall)
+    best: Array = np.full(len(at), 9.0, np.float32)
+    x = y = column = row = np.zeros(len(at), np.float32)
+    for half in (0.0, 0.5):
+        i, j = np.floor(u + half) - half + 0.5, np.floor(v + half) - half + 0.5
+        dx, dy = (u - i) * np.float32(width), (v - j) * np.float32(math.sqrt(3) * width)
+        away = np.hypot(dx, dy)
+        closer = away < best
+        best, x, y = np.where(closer, away, best), np.where(closer, dx, x), np.where(closer, dy, y)
+        column, row = np.where(closer, i, column), np.where(closer, j, row)
+    slanted = np.float32(math.sqrt(3) / 2) * abs(y) + abs(x) / 2
+    column = column - columns * np.floor(column / columns) if columns else column
+    row = row - pairs * np.floor(row / pairs) if pairs else row
+    border = np.float32(width / 2) - np.maximum(abs(x), slanted)
+    ident = _hash(2 * column + np.float32(7919) * 2 * row, at.face, seed_of(at, seed))
+    return Hexagons(border.astype(np.float32), x, y, ident, fading(width / 2, at.footprint))
+
+
+def strands(at: Place, mark: Marks, width: float, count: float, seed: int = 0) -> Array:
+    """Fine lines along strokes, mean 0, deviation 1: hairs of a lock, barbs, fibres. width: of the strokes, metres. count: of
+    lines over a stroke's width. Returns: (P,). """
+    p = np.stack([np.float32(count / 2) * mark.across, 1.5 * mark.along, 97 * mark.random(seed)]).astype(np.float32)
+    lines = Place(p, p[:2], at.face, at.footprint * np.float32(count / width), seed=at.seed)
+    return 0.75 * noise(lines, 1.0, seed) + 0.65 * noise(lines, 0.5, seed + 1, (1, 3, 1))

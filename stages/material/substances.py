@@ -1,8 +1,25 @@
 """All looks by name, and what the rest of the program must know of each."""
 
-from stages.material.looks import ceramics, even, grounds, masonry, metals, plasters, plastics, rusts, stones, textiles, woods
+from stages.material.looks import (
+    ceramics,
+    even,
+    grounds,
+    leathers,
+    masonry,
+    metals,
+    organics,
+    papers,
+    plasters,
+    plastics,
+    rusts,
+    stones,
+    textiles,
+    woods,
+)
 
-_ROOMS = (ceramics, even, grounds, masonry, metals, plasters, plastics, rusts, stones, textiles, woods)
+_ROOMS = (
+    ceramics, even, grounds, leathers, masonry, metals, organics, papers, plasters, plastics, rusts, stones, textiles, woods,
+)  # fmt: skip
 
 LOOKS = {name: look for room in _ROOMS for name, look in room.LOOKS.items()}
 """Name → the function of a place."""
