@@ -34,5 +34,5 @@ def command(output: Path, common: Common, **chosen: object) -> None:
     with reporter(common) as progress:
         result = make_swatch(output, options, common.force, progress)
     data = {"output": str(output), "up_to_date": result.up_to_date, "files": result.files, "report": result.report}
-    rows = [f"  {r['what']}: {r['where']}, {r['look']}, {r['color']}" for r in result.report["understood"]]
+    rows = [f"  {r['what']}: {r['where']}, {r['look']}, {r['colour']}" for r in result.report["understood"]]
     show(common, data, [f"{output}{': up to date' if result.up_to_date else ''}", *rows])

@@ -53,7 +53,7 @@ PARTS = _table(
 )
 """Parts of things that name a region."""
 
-TABLES = frozenset("table desk bench stool chair nightstand dresser cabinet sideboard".split())
+TABLES = frozenset(["table", "desk", "bench", "stool", "chair", "nightstand", "dresser", "cabinet", "sideboard"])
 TABLE_PARTS = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat": Region("up", 0.3)}
 """Parts of furniture, which lie elsewhere than in other things."""
 
@@ -152,7 +152,7 @@ WEATHER = _weather(
 SHOWS = frozenset(word for word, weather in WEATHER.items() if not weather.stuff)
 """Those that let show what is beneath."""
 
-PEELS = frozenset("peeling flaking flaky flaked peeled chipped".split())
+PEELS = frozenset(["peeling", "flaking", "flaky", "flaked", "peeled", "chipped"])
 """Those that leave only parts of a coat."""
 
 FADED = {"weathered": 0.85, "aged": 0.9, "old": 0.95, "faded": 0.7, "bleached": 0.6, "sun-bleached": 0.6, "vintage": 0.92}

@@ -19,7 +19,21 @@ from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Join, Phrase, split
 from stages.prior.places import (
-    ANIMALS, FADED, GATHERS, JOINED, LAYERED, ONCE, PARTS, PEELED, PEELS, TABLE_PARTS, TABLES, WEATHER, WET, WHOLE, Region,
+    ANIMALS,
+    FADED,
+    GATHERS,
+    JOINED,
+    LAYERED,
+    ONCE,
+    PARTS,
+    PEELED,
+    PEELS,
+    TABLE_PARTS,
+    TABLES,
+    WEATHER,
+    WET,
+    WHOLE,
+    Region,
 )  # fmt: skip
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
@@ -32,7 +46,7 @@ ALIKE = 0.55
 SIMILAR = 0.2
 """Distance in OKLab within which a named colour describes a stuff's own."""
 
-COATINGS = frozenset("plaster|stucco|enamel|gold leaf|gold foil|varnish|glaze|lacquer|black lacquer|wallpaper|gilding".split("|"))
+COATINGS = frozenset(["plaster", "stucco", "enamel", "gold leaf", "gold foil", "varnish", "glaze", "lacquer", "black lacquer", "wallpaper", "gilding"])
 """Thin coats that are no paint."""
 
 UNSAID = "plaster"

@@ -37,7 +37,7 @@ FAMILY_LOOKS = {
 """Family → looks that stand in for one that is missing, the best first."""
 
 GENERIC = frozenset(
-    "wood wooden timber fabric cloth textile metal metallic stone rock ceramic pottery plastic paint painted leather paper".split()
+    ["wood", "wooden", "timber", "fabric", "cloth", "textile", "metal", "metallic", "stone", "rock", "ceramic", "pottery", "plastic", "paint", "painted", "leather", "paper"]
 )
 """Names of whole families: another name before one of them says which ("teak wood")."""
 

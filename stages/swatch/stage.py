@@ -18,8 +18,9 @@ from stages.material.masks import settled
 from stages.material.recipe import Recipe
 from stages.material.surface import Surface
 from stages.material.swatch import swatch
+from stages.prior.explain import HEADINGS, explained
 from stages.prior.model import load_prior
-from stages.prior.prompt import explained, read_prompt
+from stages.prior.prompt import read_prompt
 from stages.swatch.options import SwatchOptions
 from stages.swatch.render import preview
 
@@ -58,7 +59,7 @@ def make_swatch(out: Path, options: SwatchOptions, force: bool = False, progress
         progress("preview", 0, 1)
         write_png(out / "preview.png", preview(maps, options.preview_size))
         progress("preview", 1, 1)
-        rows = [dict(zip(("what", "where", "look", "color", "roughness", "metal"), row, strict=True)) for row in explained(recipe)]
+        rows = [dict(zip(HEADINGS, row, strict=True)) for row in explained(recipe)]
         report = {"prompt": options.prompt, "understood": rows, "metres": recipe.base.metres, "recipe": recipe.to_json()}
         write_manifest(out, SWATCH, Provenance(wanted.options, wanted.seed, wanted.inputs, report), files)
         measured["texture_size"] = options.size

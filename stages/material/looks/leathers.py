@@ -4,8 +4,24 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stages.material.look import Look, averaged, each, mix, palette, shade, tint
-from stages.material.patterns import Spectrum, cells, cracks, fading, fbm, lost, marks, masked, noise, pebbles, repeats, scales, spots, threshold, tiles, warped
+from stages.material.look import Look, averaged, mix, palette, shade, tint
+from stages.material.patterns import (
+    Spectrum,
+    cracks,
+    fading,
+    fbm,
+    lost,
+    marks,
+    masked,
+    noise,
+    pebbles,
+    repeats,
+    scales,
+    spots,
+    threshold,
+    tiles,
+    warped,
+)
 from stages.material.place import Place
 
 

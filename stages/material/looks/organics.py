@@ -2,16 +2,14 @@
 
 import numpy as np
 
-from stages.material.look import Look, averaged, each, mix, palette, shade, tint
+from stages.material.look import Look, mix, palette, shade, tint
 from stages.material.patterns import (
     Spectrum,
-    cells,
     cracks,
     edge,
     fading,
     fbm,
     hexagons,
-    lost,
     marks,
     masked,
     noise,
