@@ -118,11 +118,10 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
         if mask.kind == "all" or mask.level is not None:
             return mask
         value = signal(mask, surface, place)
-        share = 1 - mask.share if mask.invert else mask.share
         if mask.kind in SIDES:  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())
-            return replace(mask, level=high - share * (high - low))
-        return replace(mask, level=float(np.quantile(value, 1 - np.clip(share, 0, 1))))
+            return replace(mask, level=high - mask.share * (high - low))
+        return replace(mask, level=float(np.quantile(value, 1 - np.clip(mask.share, 0, 1))))
 
     def layer(old: Layer, number: int) -> Layer:
         at = world.seeded(number)

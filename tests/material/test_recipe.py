@@ -52,7 +52,7 @@ def border(recipe: Recipe, size: int) -> float:
 
 def test_a_sharp_border_is_three_texels_wide_at_most() -> None:
     recipe = settled(two(Mask("below", 0.5, 0.05, 0.0)), plate(96))
-    recipe = replace(recipe, layers=(replace(recipe.layers[0], masks=(replace(recipe.layers[0].masks[0], level=0.0),)),))
+    recipe = replace(recipe, layers=(replace(recipe.layers[0], masks=(replace(recipe.layers[0].masks[0], level=3e-4),)),))
     assert 0 < border(recipe, 128) <= 3  # texels of 1 / 1280 of the object
 
 
