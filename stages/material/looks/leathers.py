@@ -116,7 +116,9 @@ def snake(at: Place) -> Look:
     flat = at.flat
     bent = warped(flat, 0.0006, 0.03, 1, 2)
     skin = scales(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.0056, 0.0042, 2)
-    middle = bent.p[:2] - np.stack([0.0028 * skin.across, 0.0084 * skin.along - 0.003]) * skin.seen  # a scale has one colour
+    middle = bent.p[:2] - (np.stack([0.0028 * skin.across, 0.0084 * skin.along - 0.003]) * skin.seen).astype(
+        np.float32
+    )  # a scale has one colour
     spread = [
         np.cos(np.pi * repeats(Place(bent.p, middle, at.face, at.footprint, at.period), length, axis)[0])
         for axis, length in enumerate((0.055, 0.042))

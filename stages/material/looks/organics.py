@@ -84,18 +84,20 @@ def fur(at: Place) -> Look:
     under = fbm(flat, Spectrum(0.006, 0.0004, 1.0, (0.4, 4, 1), 0.4, -0.1, 0.4), 1)
     color, height = palette(0.4 + 0.15 * under, "#4a3520", "#7b5c3b", "#a88558"), -0.003 + 2e-4 * under
     body = fbm(flat, Spectrum(0.25, 0.02, 0.7, patch=0.4), 2)
+    seen = [fading(width, at.footprint) for width in (0.0006, 0.0003)]
+    hidden = 1 - 0.57 * seen[0] ** 2 - 0.43 * seen[1] ** 2  # of the hairs, of which the bright ones lie on top
     for k in range(4):
-        lock = marks(at, 0.040 - 0.003 * k, 0.0040 - 0.0003 * k, 11, -np.pi / 2 + 0.1 * (k - 1.5), 0.6, 3 + k, 0.5, 0.4)
+        lock = marks(at, 0.034 - 0.003 * k, 0.0030 - 0.0002 * k, 11, -np.pi / 2 + 0.1 * (k - 1.5), 0.6, 3 + k, 0.5, 0.4)
         here = abs(lock.across) < 2
-        hair = strands(at, lock, 0.0040, 7.0, 7 + k)
+        hair = strands(at, lock, 0.0030, 5.0, 7 + k)
         along = np.where(here, lock.along, 0)
-        slope = 0.25 + (np.clip(np.where(here, lock.across, 0), -1, 1) ** 2 - 0.25) * fading(0.002, at.footprint)
+        slope = 0.25 + (np.clip(np.where(here, lock.across, 0), -1, 1) ** 2 - 0.25) * fading(0.0015, at.footprint)
         t = 0.45 + 0.12 * body + 0.22 * along + 0.3 * (lock.random(1) - 0.5) * here + 0.16 * hair
-        tone = palette(t, "#3b2917", "#6e4f2f", "#9a7549", "#c6a472", "#dcc49b")
-        tone = shade(tone, 0.16 * hair - 0.2 * (slope - 0.25) + 0.05 * (k - 1.5))
-        ragged = lock.cover * np.where(here, np.clip(1.15 - slope - 0.4 * along * along + 0.7 * hair, 0, 1), 0.75)
+        tone = palette(t, "#3a2a1b", "#66492e", "#8c6a45", "#b08f66", "#cdb391")
+        tone = shade(tone, 0.16 * hair + 0.3 * hidden - 0.2 * (slope - 0.25) + 0.05 * (k - 1.5))
+        ragged = lock.cover * np.where(here, np.clip(1.05 - slope - 0.4 * along * along + 0.9 * hair, 0, 1), 0.75)
         color = mix(color, tint(tone, 0.08 * (lock.random(2) - 0.5) * here), ragged)
-        height = mix(height, -0.002 + 0.0010 * k + 0.0008 * along - 5e-4 * slope + 1.5e-4 * hair, ragged)
+        height = mix(height, -0.002 + 0.0006 * k + 0.0005 * along - 5e-4 * slope + 8e-5 * hair, ragged)
     return Look(color, np.clip(0.62 + 0.05 * under - 20 * height, 0.2, 1), 0.0, height)
 
 

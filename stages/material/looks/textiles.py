@@ -191,6 +191,7 @@ SETT = (("#7a1a20", 8), ("#1c2a22", 1), ("#7a1a20", 2), ("#1d3b2c", 9), ("#c9a53
 def striped(within: Array, footprint: Array, length: float) -> Array:
     """The sett's colours. Args: within (P,) −1 … 1; length of the sett, metres. Returns: (3, P)."""
     total = sum(count for _, count in SETT)
+    color: Array
     x, color, start = (within + 1) / 2 * length, np.zeros((3, len(within)), np.float32), 0.0
     for stop, count in SETT:
         end = start + count / total * length
@@ -313,8 +314,8 @@ def corduroy(at: Place) -> Look:
     across, _, pitch = repeats(bent, 0.0032, 0)
     shown = fading(pitch / 2, at.footprint)
     back = (np.sqrt(np.clip(1 - across * across, 0, 1)) - 0.785) * shown
-    pile_of = fbm(flat, Spectrum(0.0012, 0.00012, 1.0, (0.6, 1.5, 1), 0.5, -0.1, 0.4), 3)
-    cross = fbm(flat, Spectrum(0.0022, 0.0004, 0.95, (1.4, 0.6, 1), 0.3, patch=0.5), 4)
+    pile_of = fbm(flat, Spectrum(0.0008, 0.0001, 1.0, (0.9, 1.1, 1), 0.3, 0.1, 0.2), 3)
+    cross = fbm(flat, Spectrum(0.0026, 0.0004, 0.9, (1.2, 0.8, 1), 0.2, patch=0.3), 4)
     worn = fbm(flat, Spectrum(0.12, 0.004, 0.8, (1, 1.5, 1), patch=0.5), 5)
     color = palette(
         0.45 + 0.10 * pile_of + 0.03 * cross + 0.04 * worn + 0.12 * back, "#4a3a2a", "#6a543d", "#8a7054", "#a58b6e"

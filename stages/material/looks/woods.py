@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stages.material.look import Look, Substance, each, mix, palette, shade, tint
+from stages.material.look import Look, Substance, averaged, each, mix, palette, shade, tint
 from stages.material.patterns import (
     Array,
     Spectrum,
@@ -153,9 +153,8 @@ def charred(at: Place) -> Look:
     split = cracks(bent, 0.013, 0.0008, 0.4, 4, 2, 0.06, (0.8, 1.4, 1)).cover
     own = (block.cells.random(1) - 0.5) * block.shown
     ash = masked(bent, Spectrum(0.05, 0.0006, 0.9, patch=0.6), 0.08, 5, 0.5)
-    color = palette(
-        0.42 + 0.12 * fibre + 0.5 * own + 0.35 * (block.dome - 0.6), "#232222", "#2c2b2b", "#3a3939", "#57575a", "#6c6c70"
-    )
+    light = 0.42 + 0.12 * fibre + 0.5 * own + 0.35 * (block.dome - 0.6)
+    color = averaged(light, 0.24 * (1 - block.shown), "#232222", "#2c2b2b", "#3a3939", "#57575a", "#6c6c70")
     color = mix(shade(color, 0.14 * fibre), palette(0.5 + 0.2 * fibre, "#7c7974", "#a19d97"), 0.55 * ash)
     color = mix(color, palette(0 * fibre, "#1c1b1b"), np.maximum(0.92 * (1 - block.cover), 0.65 * split))
     height = 0.0035 * (block.dome - 0.6) + 0.0012 * own + 1.5e-4 * fibre - 0.0022 * (1 - block.cover) - 7e-4 * split
@@ -189,7 +188,7 @@ def boards(at: Place, wood: Substance, width: float = 0.12, length: float = 1.2)
     look = wood(Place(own, at.uv, at.face, at.footprint, seed=at.seed))
     worn = bond.border + 0.0003 * noise(at.flat, 0.01, 12)
     gap = 1 - threshold(worn, 0.001, np.maximum(0.0005, 0.5 * at.footprint))
-    color = shade(look.color, 0.38 * (bond.random(4) - 0.5) - 1.6 * gap)
+    color = shade(look.color, 0.38 * (bond.random(4) - 0.5)) * (1 - 0.8 * gap)
     color = tint(color, 0.12 * (bond.random(5) - 0.5))
     height = look.height - 0.0015 * gap - 0.0004 * threshold(0.004 - bond.border, 0.0, 0.004)
     return Look(color, np.clip(look.roughness + 0.2 * gap, 0, 1), 0.0, height)
