@@ -17,6 +17,7 @@ from stages.material.patterns import (
     fading,
     fbm,
     line,
+    lost,
     marks,
     masked,
     noise,
@@ -149,14 +150,23 @@ def charred(at: Place) -> Look:
     """Timber after a fire: black, split into alligator scales across and along the grain, silver sheen, a little ash."""
     bent = warped(at, 0.0012, 0.03, 1, 4)
     block = pebbles(bent, 0.024, 0.0022, 0.22, 2, 0.45, (0.85, 1.45, 1))
-    fibre = fbm(bent, Spectrum(0.004, 0.0003, 1.0, (1, 14, 1), 0.4, -0.2, 0.4), 3)
+    spectrum = Spectrum(0.004, 0.0003, 1.0, (1, 14, 1), 0.4, -0.2, 0.4)
+    fibre = fbm(bent, spectrum, 3)
     split = cracks(bent, 0.013, 0.0008, 0.4, 4, 2, 0.06, (0.8, 1.4, 1)).cover
     own = (block.cells.random(1) - 0.5) * block.shown
     ash = masked(bent, Spectrum(0.05, 0.0006, 0.9, patch=0.6), 0.08, 5, 0.5)
     light = 0.42 + 0.12 * fibre + 0.5 * own + 0.35 * (block.dome - 0.6)
-    color = averaged(light, 0.24 * (1 - block.shown), "#232222", "#2c2b2b", "#3a3939", "#57575a", "#6c6c70")
+    color = averaged(
+        light,
+        np.hypot(0.24 * (1 - block.shown), 0.22 * lost(at, spectrum)),
+        "#232222",
+        "#2c2b2b",
+        "#3a3939",
+        "#57575a",
+        "#6c6c70",
+    )
     color = mix(shade(color, 0.14 * fibre), palette(0.5 + 0.2 * fibre, "#7c7974", "#a19d97"), 0.55 * ash)
-    color = mix(color, palette(0 * fibre, "#1c1b1b"), np.maximum(0.92 * (1 - block.cover), 0.65 * split))
+    color = mix(color, palette(0 * fibre, "#201f1f"), np.maximum(0.92 * (1 - block.cover), 0.45 * split))
     height = 0.0035 * (block.dome - 0.6) + 0.0012 * own + 1.5e-4 * fibre - 0.0022 * (1 - block.cover) - 7e-4 * split
     rough = 0.55 - 0.1 * fibre - 0.25 * own + 0.3 * ash + 0.3 * (1 - block.cover)
     return Look(tint(color, 0.03 * noise(bent, 0.03, 6)), np.clip(rough, 0.1, 1), 0.0, height)
