@@ -525,8 +525,8 @@ def laid(at: Place, width: float, lay: float, seed: int = 0) -> Loops:
     back = np.sqrt(np.clip(1 - across * across, 0, 1))
     strand = strand - columns * np.floor(strand / columns) if columns else strand
     ident = _hash(strand + np.float32(7919) * row, at.face, seed_of(at, seed + 1))
-    return Loops((dome * (0.55 + 0.45 * back)).astype(np.float32), across.astype(np.float32), (0.5 + 0.5 * x).astype(np.float32),
-                 ident, fading(lay / 2, at.footprint))  # fmt: skip
+    height, along = (a.astype(np.float32) for a in (dome * (0.55 + 0.45 * back), 0.5 + 0.5 * x))
+    return Loops(height, across.astype(np.float32), along, ident, fading(lay / 2, at.footprint))
 
 
 def wickerwork(at: Place, spacing: float, cane: float, seed: int = 0) -> Loops:
@@ -582,7 +582,8 @@ def scales(at: Place, width: float, height: float, seed: int = 0) -> Scales:
     under = np.where(behind, -reach * half, np.float32(up) * (1.3 - t))
     ident = _hash(column + np.float32(7919) * wrapped_row, at.face, seed_of(at, seed))
     along = (t + behind) / 2
-    return Scales(*(a.astype(np.float32) for a in (x, along, rim, under)), ident, fading(0.7 * min(width, height), at.footprint))
+    x, along, rim, under = (a.astype(np.float32) for a in (x, along, rim, under))
+    return Scales(x, along, rim, under, ident, fading(0.7 * min(width, height), at.footprint))
 
 
 def _within(x: Array) -> Array:

@@ -27,7 +27,7 @@ from stages.material.place import Place
 
 class Hide(NamedTuple):
     """colors: from the furrows to the backs of the grain, sRGB. grain: size of a pebble, metres. depth: of the furrows, metres.
-    crease: share of creases that are open. pull: how much paler the backs are. roughness: mean; polish: less on the backs. """
+    crease: share of creases that are open. pull: how much paler the backs are. roughness: mean; polish: less on the backs."""
 
     colors: tuple[str, ...] = ("#3f2415", "#5a3520", "#74482c", "#8c5c3a")
     grain: float = 0.0017
@@ -104,7 +104,9 @@ def suede(at: Place) -> Look:
     fibre = fbm(at, spectrum, 5)
     pill = fbm(at, Spectrum(0.006, 0.0006, 1.0, tails=0.5, skew=-0.15, patch=0.5), 6)
     lay = 0.10 * nap + 0.22 * swept
-    color = averaged(0.5 + lay + 0.12 * fibre + 0.05 * pill, 0.12 * lost(at, spectrum), "#6d5138", "#8a6b4d", "#a58663", "#bd9f7c")
+    color = averaged(
+        0.5 + lay + 0.12 * fibre + 0.05 * pill, 0.12 * lost(at, spectrum), "#6d5138", "#8a6b4d", "#a58663", "#bd9f7c"
+    )
     color = tint(shade(color, 0.05 * fibre + 0.03 * pill), 0.03 * nap + 0.03 * noise(at, 0.02, 7))
     return Look(color, np.clip(0.93 + 0.03 * fibre - 0.2 * lay, 0, 1), 0.0, 2.5e-5 * fibre + 2e-5 * pill + 5e-5 * nap)
 
@@ -114,9 +116,18 @@ def snake(at: Place) -> Look:
     flat = at.flat
     bent = warped(flat, 0.0006, 0.03, 1, 2)
     skin = scales(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.0056, 0.0042, 2)
-    middle = bent.p[:2] - np.stack([0.0028 * skin.across, 0.0084 * skin.along - 0.003]) * skin.seen  # a scale has one colour
-    spread = [np.cos(np.pi * repeats(Place(bent.p, middle, at.face, at.footprint, at.period), length, axis)[0]) for axis, length in enumerate((0.055, 0.042))]
-    saddle = 0.75 * (abs(spread[0]) ** 0.8 * np.sign(spread[0]) + spread[1]) + 0.4 * noise(bent, 0.03, 4) + 0.2 * (skin.random(1) - 0.5) * skin.seen
+    middle = bent.p[:2] - (np.stack([0.0028 * skin.across, 0.0084 * skin.along - 0.003]) * skin.seen).astype(
+        np.float32
+    )  # a scale has one colour
+    spread = [
+        np.cos(np.pi * repeats(Place(bent.p, middle, at.face, at.footprint, at.period), length, axis)[0])
+        for axis, length in enumerate((0.055, 0.042))
+    ]
+    saddle = (
+        0.75 * (abs(spread[0]) ** 0.8 * np.sign(spread[0]) + spread[1])
+        + 0.4 * noise(bent, 0.03, 4)
+        + 0.2 * (skin.random(1) - 0.5) * skin.seen
+    )
     fine = fbm(flat, Spectrum(0.0012, 0.00012, 1.0, (0.7, 1.6, 1), 0.4, -0.15, 0.4), 5)
     rim = np.exp(-np.clip(skin.rim, 0, 1) / 0.0003) * skin.seen
     shadow = np.exp(-np.clip(skin.under, 0, 1) / 0.0005) * skin.seen
@@ -128,7 +139,12 @@ def snake(at: Place) -> Look:
     color = shade(color, 0.22 * keel + 0.12 * rim - 0.8 * shadow + 0.06 * fine + 0.25 * (0.5 - skin.along) * skin.seen)
     lift = (1 - np.exp(-np.clip(skin.rim, 0, 1) / 0.0005) - 0.8 * skin.along + 0.25 * keel) * skin.seen
     rough = 0.42 + 0.2 * shadow - 0.08 * keel + 0.05 * fine
-    return Look(tint(color, 0.05 * (skin.random(3) - 0.5) * skin.seen), np.clip(rough, 0.05, 1), 0.0, 3.5e-4 * (lift - 0.4) + 8e-6 * fine)
+    return Look(
+        tint(color, 0.05 * (skin.random(3) - 0.5) * skin.seen),
+        np.clip(rough, 0.05, 1),
+        0.0,
+        3.5e-4 * (lift - 0.4) + 8e-6 * fine,
+    )
 
 
 def fish_scales(at: Place) -> Look:
@@ -142,12 +158,23 @@ def fish_scales(at: Place) -> Look:
     shadow = np.exp(-np.clip(skin.under, 0, 1) / 0.0016) * skin.seen
     ray = np.cos(np.pi * 9 * skin.across) * (1 - skin.along) * fading(0.003, at.footprint)
     own = (skin.random(1) - 0.5) * skin.seen
-    color = palette(0.5 + 0.4 * own + 0.12 * wide + 0.08 * fine - 0.25 * (skin.along - 0.45) * skin.seen, "#1f3d38", "#2f5f54", "#4a8370", "#7ba890")
+    color = palette(
+        0.5 + 0.4 * own + 0.12 * wide + 0.08 * fine - 0.25 * (skin.along - 0.45) * skin.seen,
+        "#1f3d38",
+        "#2f5f54",
+        "#4a8370",
+        "#7ba890",
+    )
     color = mix(color, palette(0.5 + 0.3 * fine, "#8d9a6a", "#c2c498"), 0.55 * rim)
     color = shade(color, 0.07 * ring + 0.05 * ray + 0.06 * fine - 0.9 * shadow)
     lift = (1 - np.exp(-np.clip(skin.rim, 0, 1) / 0.001) - 0.9 * skin.along) * skin.seen
     rough = 0.3 + 0.05 * fine + 0.25 * shadow + 0.1 * rim + 0.06 * ring
-    return Look(tint(color, 0.12 * (skin.random(2) - 0.5) * skin.seen, 0.05 * own), np.clip(rough, 0.05, 1), 0.0, 9e-4 * (lift - 0.4) + 2e-5 * ring + 2e-5 * ray)
+    return Look(
+        tint(color, 0.12 * (skin.random(2) - 0.5) * skin.seen, 0.05 * own),
+        np.clip(rough, 0.05, 1),
+        0.0,
+        9e-4 * (lift - 0.4) + 2e-5 * ring + 2e-5 * ray,
+    )
 
 
 def crocodile(at: Place) -> Look:
@@ -168,10 +195,14 @@ def crocodile(at: Place) -> Look:
     skin = pebbles(warped(flat, 0.0002, 0.001, 6, 2), 0.0013, 0.0001, 0.3, 7, 1.0)
     fine = fbm(flat, Spectrum(0.0016, 0.00015, 1.0, tails=0.4, skew=-0.15, patch=0.4), 8)
     pit = spots(bent, 0.011, (0.0002, 0.0005), 0.5, 9).cover * cover
-    color = palette(0.5 + 0.22 * own + 0.45 * (dome - 0.6) + 0.08 * wide + 0.08 * fine, "#2f1f12", "#4b331d", "#6b4a2b", "#8a6540")
+    color = palette(
+        0.5 + 0.22 * own + 0.45 * (dome - 0.6) + 0.08 * wide + 0.08 * fine, "#2f1f12", "#4b331d", "#6b4a2b", "#8a6540"
+    )
     furrow = palette(0.45 + 0.5 * (skin.dome - 0.75) + 0.1 * fine, "#24180e", "#382616", "#4f3822")
     color = shade(mix(furrow, color, cover), 0.05 * fine - 0.5 * fold - 0.6 * pit)
-    height = 7e-4 * (dome - 0.6) + 1.0e-4 * own - 1.5e-4 * fold - 1e-4 * pit + 1e-4 * (skin.dome - 0.75) * (1 - cover) + 6e-6 * fine
+    height = (
+        7e-4 * (dome - 0.6) + 1.0e-4 * own - 1.5e-4 * fold - 1e-4 * pit + 1e-4 * (skin.dome - 0.75) * (1 - cover) + 6e-6 * fine
+    )
     rough = 0.30 + 0.05 * fine + 0.25 * (1 - cover) + 0.2 * fold
     return Look(tint(color, 0.06 * own + 0.04 * noise(flat, 0.04, 10)), np.clip(rough, 0.05, 1), 0.0, height)
 
@@ -181,5 +212,11 @@ LOOKS = {
     "scales": fish_scales, "crocodile": crocodile,
 }  # fmt: skip
 METRES = {
-    "leather": 0.09, "worn leather": 0.12, "patent leather": 0.1, "suede": 0.1, "snakeskin": 0.12, "scales": 0.2, "crocodile": 0.2,
+    "leather": 0.09,
+    "worn leather": 0.12,
+    "patent leather": 0.1,
+    "suede": 0.1,
+    "snakeskin": 0.12,
+    "scales": 0.2,
+    "crocodile": 0.2,
 }

@@ -11,7 +11,6 @@ from stages.material.patterns import (
     fbm,
     hexagons,
     marks,
-    masked,
     noise,
     pebbles,
     repeats,
@@ -29,17 +28,17 @@ def skin(at: Place) -> Look:
     """Human skin: a net of fine furrows, pores, blood that shines through in patches, a freckle here and there."""
     bent = warped(at, 0.0008, 0.01, 1, 2)
     net = pebbles(warped(bent, 0.00008, 0.0005, 2, 2), 0.00085, 0.00004, 0.2, 3, 0.9, (1, 0.75, 1))
-    wide_net = cracks(bent, 0.0045, 0.00016, 0.55, 4, 2, 0.08)
+    wide_net = cracks(bent, 0.0045, 0.00014, 0.35, 4, 2, 0.05)
     pore = spots(at, 0.0016, (0.00005, 0.00016), 0.7, 5).cover
     blood = fbm(warped(at, 0.004, 0.03, 6), Spectrum(0.04, 0.0012, 0.85, tails=0.2, patch=0.5), 7)
     fine = fbm(at, Spectrum(0.0012, 0.00012, 1.0, tails=0.4, skew=-0.1, patch=0.4), 8)
     freckle = spots(warped(at, 0.0006, 0.003, 9), 0.02, (0.0004, 0.0018), 0.35, 10).cover
     bump = net.dome - 0.75
     color = palette(0.5 + 0.09 * blood + 0.16 * bump + 0.05 * fine, "#b17f66", "#c99a80", "#d9b198", "#e3c2ab")
-    color = tint(color, 0.07 * blood + 0.03 * noise(at, 0.012, 11), -0.05 * blood)
+    color = tint(color, 0.05 * blood + 0.02 * noise(at, 0.012, 11), -0.02 * blood)
     color = mix(color, palette(0 * fine, "#8f5f45"), 0.45 * freckle)
     color = shade(color, 0.03 * fine - 0.22 * wide_net.cover - 0.35 * pore)
-    height = 3e-5 * bump + 3e-6 * fine - 4e-5 * wide_net.cover - 4e-5 * pore + 4e-5 * blood
+    height = 3e-5 * bump + 3e-6 * fine - 1.5e-5 * wide_net.cover - 4e-5 * pore + 4e-5 * blood
     return Look(color, np.clip(0.46 - 0.1 * bump + 0.05 * fine + 0.12 * wide_net.cover + 0.04 * blood, 0, 1), 0.0, height)
 
 
@@ -48,14 +47,19 @@ def bone(at: Place) -> Look:
     bent = warped(at, 0.003, 0.03, 1, 3)
     stain = fbm(bent, Spectrum(0.08, 0.0012, 0.85, (1, 1.8, 1), 0.2, -0.1, 0.5), 2)
     fine = fbm(at, Spectrum(0.0024, 0.0002, 1.0, (1, 2.5, 1), 0.5, -0.2, 0.5), 3)
-    pore = spots(bent, 0.0036, (0.0001, 0.0007), 0.6, 4, (0.8, 1.6, 1)).cover * np.clip(0.7 - 0.3 * stain, 0, 1)
-    crack = cracks(bent, 0.03, 0.0005, 0.28, 5, 3, 0.06, (0.7, 2.2, 1))
+    pore = spots(bent, 0.0034, (0.0002, 0.0010), 0.75, 4, (0.8, 1.6, 1)).cover * np.clip(0.7 - 0.3 * stain, 0, 1)
+    crack = cracks(bent, 0.04, 0.0005, 0.05, 5, 2, 0.03, (0.6, 3, 1))
     swell = fbm(at, Spectrum(0.05, 0.008, 0.6), 6)
     earth = np.clip(crack.cover + 0.35 * np.exp(-crack.near / 0.0012) + 0.8 * pore, 0, 1)
     color = palette(0.55 + 0.13 * stain + 0.06 * fine, "#b39c74", "#cdbb95", "#ded0b1", "#e9dfc8")
     color = mix(shade(color, 0.05 * fine), palette(0.5 + 0.2 * fine, "#4c3923", "#6d5536"), 0.7 * earth)
     height = 4e-4 * swell + 1.2e-5 * fine - 2.5e-4 * crack.cover - 2e-4 * pore
-    return Look(tint(color, 0.03 * stain + 0.03 * noise(at, 0.02, 7)), np.clip(0.55 + 0.05 * fine - 0.05 * stain + 0.25 * earth, 0, 1), 0.0, height)
+    return Look(
+        tint(color, 0.03 * stain + 0.03 * noise(at, 0.02, 7)),
+        np.clip(0.55 + 0.05 * fine - 0.05 * stain + 0.25 * earth, 0, 1),
+        0.0,
+        height,
+    )
 
 
 def horn(at: Place) -> Look:
@@ -66,52 +70,72 @@ def horn(at: Place) -> Look:
     cloud = fbm(bent, Spectrum(0.12, 0.02, 0.7, (1, 2.5, 1)), 3)
     fibre = fbm(flat, Spectrum(0.0024, 0.0002, 1.0, (1, 18, 1), 0.4, -0.1, 0.4), 4)
     ring = fbm(bent, Spectrum(0.02, 0.0025, 0.75, (12, 1, 1), 0.2), 5)
-    flake = masked(bent, Spectrum(0.02, 0.0008, 0.9, (1, 3, 1), patch=0.5), 0.1, 6, 0.2)
+    scratch = marks(at, 0.03, 0.0003, 4, 1.5, 0.9, 6, 0.7, 0.1).cover
     t = 0.48 + 0.16 * streak + 0.22 * cloud + 0.06 * ring + 0.06 * fibre
     color = palette(t, "#241a14", "#4a3524", "#856239", "#b9945f", "#d9c297")
-    color = shade(mix(color, palette(0.5 + 0.2 * fibre, "#b8a88a", "#d4c7ad"), 0.3 * flake), 0.06 * fibre + 0.06 * ring)
-    rough = 0.32 + 0.05 * fibre + 0.05 * ring + 0.3 * flake
-    return Look(color, np.clip(rough, 0.05, 1), 0.0, 3e-4 * ring + 2e-5 * fibre - 5e-5 * flake)
+    color = shade(color, 0.09 * fibre + 0.06 * ring + 0.12 * scratch)
+    rough = 0.32 + 0.05 * fibre + 0.05 * ring + 0.2 * scratch
+    return Look(color, np.clip(rough, 0.05, 1), 0.0, 3e-4 * ring + 2e-5 * fibre - 1e-5 * scratch)
 
 
 def fur(at: Place) -> Look:
     """A pelt: tapered locks that lie over one another down the body, single hairs in each, dark roots and pale tips."""
     flat = at.flat
     under = fbm(flat, Spectrum(0.006, 0.0004, 1.0, (0.4, 4, 1), 0.4, -0.1, 0.4), 1)
-    color, height = palette(0.4 + 0.15 * under, "#2f2115", "#4c3722", "#6b5136"), -0.003 + 2e-4 * under
+    color, height = palette(0.4 + 0.15 * under, "#4a3520", "#7b5c3b", "#a88558"), -0.003 + 2e-4 * under
     body = fbm(flat, Spectrum(0.25, 0.02, 0.7, patch=0.4), 2)
+    seen = [fading(width, at.footprint) for width in (0.0006, 0.0003)]
+    hidden = 1 - 0.57 * seen[0] ** 2 - 0.43 * seen[1] ** 2  # of the hairs, of which the bright ones lie on top
     for k in range(4):
-        lock = marks(at, 0.05 - 0.005 * k, 0.0085 - 0.001 * k, 10, -np.pi / 2 + 0.1 * (k - 1.5), 0.9, 3 + k, 0.5, 0.5)
-        hair = strands(at, lock, 0.0085, 11.0, 7 + k)
-        along, side = np.where(abs(lock.across) < 2, lock.along, 0), np.where(abs(lock.across) < 2, lock.across, 0)
-        t = 0.45 + 0.12 * body + 0.25 * along + 0.5 * (lock.random(1) - 0.5) + 0.14 * hair
-        tone = palette(t, "#3b2917", "#6e4f2f", "#9a7549", "#c6a472", "#dcc49b")
-        tone = shade(tone, 0.16 * hair - 0.3 * side * side + 0.10 * (k - 1.5) + 0.1)
-        ragged = lock.cover * np.clip(1.25 - 1.2 * side * side + 0.5 * hair, 0, 1)
-        color = mix(color, tint(tone, 0.08 * (lock.random(2) - 0.5)), ragged)
-        height = mix(height, -0.002 + 0.0012 * k + 0.0012 * along - 8e-4 * side * side + 1.5e-4 * hair, ragged)
+        lock = marks(at, 0.034 - 0.003 * k, 0.0030 - 0.0002 * k, 11, -np.pi / 2 + 0.1 * (k - 1.5), 0.6, 3 + k, 0.5, 0.4)
+        here = abs(lock.across) < 2
+        hair = strands(at, lock, 0.0030, 5.0, 7 + k)
+        along = np.where(here, lock.along, 0)
+        slope = 0.25 + (np.clip(np.where(here, lock.across, 0), -1, 1) ** 2 - 0.25) * fading(0.0015, at.footprint)
+        t = 0.45 + 0.12 * body + 0.22 * along + 0.3 * (lock.random(1) - 0.5) * here + 0.16 * hair
+        tone = palette(t, "#3a2a1b", "#66492e", "#8c6a45", "#b08f66", "#cdb391")
+        tone = shade(tone, 0.16 * hair + 0.3 * hidden - 0.2 * (slope - 0.25) + 0.05 * (k - 1.5))
+        ragged = lock.cover * np.where(here, np.clip(1.05 - slope - 0.4 * along * along + 0.9 * hair, 0, 1), 0.75)
+        color = mix(color, tint(tone, 0.08 * (lock.random(2) - 0.5) * here), ragged)
+        height = mix(height, -0.002 + 0.0006 * k + 0.0005 * along - 5e-4 * slope + 8e-5 * hair, ragged)
     return Look(color, np.clip(0.62 + 0.05 * under - 20 * height, 0.2, 1), 0.0, height)
 
 
 def feathers(at: Place) -> Look:
     """Plumage: rounded feathers in rows, a pale shaft, barbs slanting from it that part here and there, light rims."""
     flat = at.flat
-    bent = warped(flat, 0.0015, 0.05, 1, 2)
+    bent = warped(flat, 0.0035, 0.06, 1, 2)
     vane = scales(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.030, 0.019, 2)
     side = abs(vane.across)
     own = (vane.random(1) - 0.5) * vane.seen
     wobble = fbm(flat, Spectrum(0.006, 0.0012, 0.8), 3)
     barb = np.cos(2 * np.pi * (46 * vane.along + 15 * side + 0.5 * wobble)) * fading(0.0011, at.footprint)
     tuft = fbm(flat, Spectrum(0.0016, 0.00015, 1.0, (0.7, 1.5, 1), 0.4, patch=0.4), 4)
-    part = np.clip(np.cos(2 * np.pi * (2.4 * vane.along + 0.8 * side + vane.random(5))) - 0.93, 0, 1) / 0.07 * (vane.random(6) < 0.5) * vane.seen
+    part = (
+        np.clip(np.cos(2 * np.pi * (2.4 * vane.along + 0.8 * side + vane.random(5))) - 0.93, 0, 1)
+        / 0.07
+        * (vane.random(6) < 0.5)
+        * vane.seen
+    )
     rim, shadow = (np.exp(-np.clip(x, 0, 1) / w) * vane.seen for x, w in ((vane.rim, 0.0022), (vane.under, 0.0026)))
     shaft = np.exp(-((vane.across / 0.045) ** 2)) * vane.seen
-    bar = threshold(np.cos(2 * np.pi * (2.1 * vane.along + 0.3 * side * side)) + 0.3 * wobble, 0.35, 0.3) * vane.seen + 0.38 * (1 - vane.seen)
-    color = mix(palette(0.5 + 0.35 * own + 0.06 * tuft, "#8a7358", "#a98f70", "#c4ad8e"), palette(0.5 + 0.35 * own + 0.08 * tuft, "#3a2c20", "#54402d", "#6d553d"), 0.85 * bar)
+    bar = threshold(np.cos(2 * np.pi * (2.1 * vane.along + 0.3 * side * side)) + 0.3 * wobble, 0.35, 0.3) * vane.seen + 0.38 * (
+        1 - vane.seen
+    )
+    color = mix(
+        palette(0.5 + 0.6 * own + 0.06 * tuft, "#8a7358", "#a98f70", "#c4ad8e"),
+        palette(0.5 + 0.35 * own + 0.08 * tuft, "#3a2c20", "#54402d", "#6d553d"),
+        0.85 * bar,
+    )
     color = mix(color, palette(0.5 + 0.2 * tuft, "#c9b897", "#e6dbc4"), np.clip(0.7 * rim + 0.6 * shaft, 0, 1))
-    color = shade(color, 0.11 * barb + 0.07 * tuft - 0.85 * shadow - 0.5 * part + 0.1 * (0.5 - vane.along) * vane.seen)
+    color = shade(color, 0.16 * barb + 0.07 * tuft - 0.85 * shadow - 0.5 * part + 0.1 * (0.5 - vane.along) * vane.seen)
     lift = (1 - rim - 0.9 * vane.along + 0.2 * shaft) * vane.seen - 0.3
-    return Look(tint(color, 0.06 * own), np.clip(0.6 + 0.05 * barb + 0.05 * tuft + 0.15 * shadow, 0, 1), 0.0, 7e-4 * lift + 2.5e-5 * barb - 1e-4 * part)
+    return Look(
+        tint(color, 0.06 * own),
+        np.clip(0.6 + 0.05 * barb + 0.05 * tuft + 0.15 * shadow, 0, 1),
+        0.0,
+        7e-4 * lift + 2.5e-5 * barb - 1e-4 * part,
+    )
 
 
 def bread(at: Place) -> Look:
@@ -121,8 +145,10 @@ def bread(at: Place) -> Look:
     wide = fbm(at, Spectrum(0.06, 0.004, 0.8), 3)
     color = palette(0.6 + 0.08 * wide + 0.10 * fine, "#d3b688", "#e3cda3", "#efe0c0", "#f4e9d2")
     height = 6e-5 * fine + 3e-4 * wide
-    for k, (size, radius, share) in enumerate(((0.0016, 0.0006, 0.8), (0.0035, 0.0013, 0.75), (0.0075, 0.0028, 0.55), (0.016, 0.0058, 0.3))):
-        hole = spots(bent, size, (0.25 * radius, radius), share, 4 + k, (1, 0.8, 1))
+    for k, (size, radius, share) in enumerate(
+        ((0.0016, 0.0006, 0.8), (0.0035, 0.0013, 0.75), (0.0075, 0.0028, 0.85), (0.016, 0.0062, 0.6))
+    ):
+        hole = spots(bent, size, (0.5 * radius, 1.15 * radius), share, 4 + k, (1, 0.8, 1))
         deep = np.clip(hole.inside / np.maximum(hole.radius, 1e-5), 0, 1)
         floor = palette(0.6 - 0.4 * deep + 0.08 * fine, "#a98557", "#c8a877", "#dec398")
         rim = np.exp(-np.clip(-hole.inside, 0, 1) / (0.12 * radius)) * (1 - hole.cover) * fading(radius, at.footprint)
@@ -147,13 +173,15 @@ def chocolate(at: Place) -> Look:
     color = shade(color, 0.05 * fine - 0.5 * seam + 0.14 * lip - 0.7 * hole)
     color = mix(color, palette(0.5 + 0.2 * fine, "#6f472f", "#8b6347"), np.clip(0.4 * scratch + 0.7 * crumb, 0, 1))
     rough = 0.30 + 0.06 * cloud + 0.05 * fine + 0.2 * scratch + 0.25 * crumb
-    return Look(color, np.clip(rough, 0.08, 1), 0.0, 0.0030 * (bevel - 0.75) + 3e-6 * fine - 2e-4 * hole + 1.5e-4 * crumb + 4e-5 * cloud)
+    return Look(
+        color, np.clip(rough, 0.08, 1), 0.0, 0.0030 * (bevel - 0.75) + 3e-6 * fine - 2e-4 * hole + 1.5e-4 * crumb + 4e-5 * cloud
+    )
 
 
 def cheese(at: Place) -> Look:
     """Cut Emmental: pale yellow, smooth-walled holes, small blind ones, drops of fat, the drag of the knife."""
     bent = warped(at, 0.0015, 0.02, 1, 2)
-    hole, small = spots(bent, 0.045, (0.004, 0.016), 0.75, 2), spots(bent, 0.02, (0.0005, 0.003), 0.5, 3)
+    hole, small = spots(bent, 0.045, (0.006, 0.018), 0.9, 2), spots(bent, 0.02, (0.0005, 0.003), 0.5, 3)
     cloud = fbm(at, Spectrum(0.08, 0.002, 0.85, patch=0.4), 4)
     drag = fbm(at.flat, Spectrum(0.004, 0.0003, 1.0, (6, 0.6, 1), 0.4, -0.15, 0.5), 5)
     fine = fbm(at, Spectrum(0.0022, 0.0002, 1.0, tails=0.5, skew=-0.2, patch=0.5), 6)
@@ -165,24 +193,32 @@ def cheese(at: Place) -> Look:
     color = shade(color, -0.4 * small.cover * (1 - hole.cover))
     sphere = hole.radius * (np.sqrt(np.clip(1 - (1 - deep) ** 2, 0, 1)))
     height = -0.9 * hole.cover * sphere - 0.6 * small.cover * np.clip(small.inside, 0, 1) + 3e-5 * drag + 2e-5 * fine
-    return Look(tint(color, 0.03 * cloud), np.clip(0.45 + 0.05 * fine + 0.05 * drag - 0.1 * hole.cover, 0.05, 1), 0.0, height + 0.0015)
+    return Look(
+        tint(color, 0.03 * cloud), np.clip(0.45 + 0.05 * fine + 0.05 * drag - 0.1 * hole.cover, 0.05, 1), 0.0, height + 0.0015
+    )
 
 
 def meat(at: Place) -> Look:
     """Raw beef: bundles of dark red fibres, seams of white fat that branch between them, wet."""
-    bent = warped(at, 0.010, 0.06, 1, 3)
+    bent = warped(at, 0.005, 0.06, 1, 3)
     bundle = pebbles(warped(bent, 0.0003, 0.002, 2, 2), 0.0032, 0.00012, 0.2, 3, 1.0, (1, 1.8, 1))
     fibre = fbm(bent, Spectrum(0.0020, 0.00015, 1.0, (1, 3, 1), 0.4, -0.15, 0.4), 4)
     cloud = fbm(bent, Spectrum(0.06, 0.003, 0.8, patch=0.5), 5)
-    seam = cracks(bent, 0.055, 0.0050, 0.42, 6, 3, 0.16, (0.8, 1.5, 1))
-    vein = cracks(warped(bent, 0.002, 0.008, 7, 3), 0.015, 0.0010, 0.22, 8, 2, 0.14, (0.8, 1.6, 1))
+    seam = cracks(bent, 0.055, 0.0042, 0.14, 6, 3, 0.08, (0.8, 1.5, 1))
+    vein = cracks(warped(bent, 0.002, 0.008, 7, 3), 0.015, 0.0008, 0.02, 8, 2, 0.10, (0.8, 1.6, 1))
     fat = np.clip(seam.cover + 0.85 * vein.cover, 0, 1)
     own = (bundle.cells.random(1) - 0.5) * bundle.shown
-    color = palette(0.5 + 0.13 * cloud + 0.25 * own + 0.3 * (bundle.dome - 0.75) + 0.07 * fibre, "#560e12", "#7d1b1d", "#a0302c", "#bb4c42")
-    color = mix(shade(color, 0.07 * fibre), palette(0.55 + 0.2 * fibre + 0.1 * cloud, "#d8b39a", "#ead3bd", "#f2e6d6"), 0.92 * fat)
+    color = palette(
+        0.5 + 0.13 * cloud + 0.25 * own + 0.3 * (bundle.dome - 0.75) + 0.07 * fibre, "#560e12", "#7d1b1d", "#a0302c", "#bb4c42"
+    )
+    color = mix(
+        shade(color, 0.07 * fibre), palette(0.55 + 0.2 * fibre + 0.1 * cloud, "#d8b39a", "#ead3bd", "#f2e6d6"), 0.92 * fat
+    )
     color = tint(color, 0.04 * noise(at, 0.03, 9), -0.04 * own)
     rough = 0.26 + 0.05 * fibre - 0.1 * (bundle.dome - 0.75) + 0.14 * fat
-    return Look(color, np.clip(rough, 0.05, 1), 0.0, 2e-4 * (bundle.dome - 0.75) + 3e-5 * fibre + 3e-4 * fat + 3e-4 * cloud - 5e-5)
+    return Look(
+        color, np.clip(rough, 0.05, 1), 0.0, 2e-4 * (bundle.dome - 0.75) + 3e-5 * fibre + 3e-4 * fat + 3e-4 * cloud - 5e-5
+    )
 
 
 def orange_peel(at: Place) -> Look:
@@ -190,15 +226,16 @@ def orange_peel(at: Place) -> Look:
     bent = warped(at, 0.0006, 0.006, 1, 2)
     gland = pebbles(bent, 0.0026, 0.0, 0.75, 2, 0.75)
     shown = fading(0.0026, at.footprint)
-    pit = np.exp(-((gland.cells.near / (0.0004 + 0.0003 * gland.cells.random(1))) ** 2)) * shown
+    pit = np.exp(-((gland.cells.near / (0.0005 + 0.0004 * gland.cells.random(1))) ** 2)) * shown
     cloud = fbm(at, Spectrum(0.05, 0.002, 0.85, patch=0.4), 3)
     fine = fbm(at, Spectrum(0.0012, 0.00012, 1.0, tails=0.4, skew=0.1, patch=0.4), 4)
     own = (gland.cells.random(2) - 0.5) * shown
-    scar = masked(at, Spectrum(0.03, 0.0006, 0.9, patch=0.6), 0.02, 5, 0.15)
-    color = palette(0.5 + 0.12 * cloud + 0.25 * own + 0.2 * (gland.dome - 0.7) + 0.05 * fine, "#d9660a", "#ee7f12", "#f7972a", "#fbb04e")
-    color = shade(mix(color, palette(0.5 + 0.2 * fine, "#b98a4b", "#d0aa74"), 0.6 * scar), 0.04 * fine - 0.30 * (pit - 0.12))
-    height = 2.2e-4 * (gland.dome - 0.7) - 2.8e-4 * (pit - 0.12) + 4e-6 * fine + 2e-4 * cloud
-    return Look(tint(color, 0.05 * cloud), np.clip(0.36 + 0.04 * fine + 0.12 * pit + 0.2 * scar, 0.05, 1), 0.0, height)
+    color = palette(
+        0.5 + 0.08 * cloud + 0.12 * own + 0.15 * (gland.dome - 0.7) + 0.05 * fine, "#d9660a", "#ee7f12", "#f7972a", "#fbb04e"
+    )
+    color = shade(color, 0.05 * fine - 0.6 * (pit - 0.12))
+    height = 1.4e-4 * (gland.dome - 0.7) - 2.8e-4 * (pit - 0.12) + 4e-6 * fine + 3e-5 * cloud
+    return Look(tint(color, 0.05 * cloud), np.clip(0.36 + 0.04 * fine + 0.12 * pit, 0.05, 1), 0.0, height)
 
 
 def tomato_skin(at: Place) -> Look:
@@ -207,33 +244,45 @@ def tomato_skin(at: Place) -> Look:
     streak = fbm(at.upright, Spectrum(0.02, 0.001, 0.85, (1, 5, 1), 0.2, patch=0.4), 2)
     cloud = fbm(warped(at, 0.006, 0.03, 3), Spectrum(0.06, 0.004, 0.75, patch=0.4), 4)
     fine = fbm(at, Spectrum(0.0016, 0.00012, 1.05, tails=0.5, skew=0.2, patch=0.4), 5)
-    scar = cracks(warped(at, 0.001, 0.006, 6, 2), 0.03, 0.0004, 0.12, 7, 2, 0.08).cover
+    scar = cracks(warped(at, 0.001, 0.006, 6, 2), 0.03, 0.0003, -0.5, 7, 2, 0.06).cover
     net = pebbles(at, 0.0009, 0.0, 0.4, 8, 1.0)
-    color = palette(0.5 + 0.12 * cloud + 0.08 * streak + 0.06 * fine + 0.1 * (net.dome - 0.7), "#a50f0a", "#c11a10", "#d42d18", "#e04c22")
+    color = palette(
+        0.5 + 0.12 * cloud + 0.08 * streak + 0.06 * fine + 0.1 * (net.dome - 0.7), "#a50f0a", "#c11a10", "#d42d18", "#e04c22"
+    )
     color = mix(color, palette(0.5 + 0.3 * fine, "#dd6a2a", "#eb9747"), 0.4 * fleck)
     color = mix(shade(color, 0.05 * fine), palette(0.5 + 0.2 * fine, "#a8743e", "#c89a62"), 0.7 * scar)
     rough = 0.16 + 0.03 * fine + 0.03 * cloud + 0.05 * fleck + 0.4 * scar
-    return Look(tint(color, 0.04 * streak), np.clip(rough, 0.03, 1), 0.0, 1.5e-4 * cloud + 4e-6 * (net.dome - 0.7) + 1e-5 * fleck + 6e-5 * scar)
+    return Look(
+        tint(color, 0.04 * streak),
+        np.clip(rough, 0.03, 1),
+        0.0,
+        1.5e-4 * cloud + 4e-6 * (net.dome - 0.7) + 1e-5 * fleck + 6e-5 * scar,
+    )
 
 
 def seashell(at: Place) -> Look:
     """A scallop: rounded ribs, growth lines across them, bands of rose and cream, chalk in the grooves."""
     flat = at.flat
-    bent = warped(flat, 0.0012, 0.03, 1, 2)
-    across, rib, _ = repeats(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.0085, 0)
+    bent = warped(flat, 0.0005, 0.03, 1, 2)
+    across, _, _ = repeats(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.0085, 0)
     shown = fading(0.005, at.footprint)
     dome = 0.785 + (np.sqrt(np.clip(1 - across * across, 0, 1)) - 0.785) * shown
     lag = bent.moved(np.stack([0 * across, 0.0014 * (1 - across * across), 0 * across]).astype(np.float32))
-    growth = fbm(lag, Spectrum(0.010, 0.0005, 0.95, (9, 1, 1), 0.3, -0.15, 0.4), 3)
+    growth = fbm(lag, Spectrum(0.008, 0.00025, 1.0, (9, 1, 1), 0.4, -0.15, 0.4), 3)
     band = fbm(lag, Spectrum(0.035, 0.008, 0.6, (6, 1, 1)), 4)
     ray = fbm(flat, Spectrum(0.012, 0.002, 0.8, (1, 12, 1)), 5)
     fine = fbm(flat, Spectrum(0.0016, 0.00015, 1.0, (1.5, 0.7, 1), 0.4, -0.1, 0.4), 6)
     t = 0.48 + 0.22 * band + 0.10 * growth + 0.10 * ray
     color = palette(t, "#a35a46", "#c98a70", "#e2b99c", "#efdcc6", "#f3e9db")
-    color = shade(color, 0.06 * growth + 0.04 * fine + 0.55 * (dome - 0.785))
+    color = shade(color, 0.09 * growth + 0.09 * fine + 0.55 * (dome - 0.785))
     chalk = np.exp(-(1 - abs(across)) / 0.10) * shown
     color = mix(color, palette(0.5 + 0.2 * fine, "#cdbfae", "#e2d8ca"), 0.35 * chalk)
-    return Look(tint(color, 0.04 * band), np.clip(0.34 + 0.05 * growth + 0.04 * fine + 0.3 * chalk, 0.05, 1), 0.0, 0.0019 * (dome - 0.785) + 7e-5 * growth + 6e-6 * fine)
+    return Look(
+        tint(color, 0.04 * band),
+        np.clip(0.34 + 0.05 * growth + 0.04 * fine + 0.3 * chalk, 0.05, 1),
+        0.0,
+        0.0019 * (dome - 0.785) + 7e-5 * growth + 6e-6 * fine,
+    )
 
 
 def honeycomb(at: Place) -> Look:
@@ -250,12 +299,22 @@ def honeycomb(at: Place) -> Look:
     depth = np.clip((comb.border - 0.0004) / 0.0022, 0, 1)
     gleam = np.exp(-(((comb.x + 0.0007) ** 2 + (comb.y - 0.0008) ** 2) / 0.0006**2)) * comb.seen
     own = (comb.random(2) - 0.5) * comb.seen
-    honey = palette(0.5 + 0.5 * own - 0.35 * (depth - 0.5) * comb.seen + 0.10 * wide + 0.03 * fine, "#6d2f05", "#a9590d", "#d68a1c", "#eeb23e")
+    honey = palette(
+        0.5 + 0.5 * own - 0.35 * (depth - 0.5) * comb.seen + 0.10 * wide + 0.03 * fine,
+        "#6d2f05",
+        "#a9590d",
+        "#d68a1c",
+        "#eeb23e",
+    )
     honey = mix(honey, palette(0 * fine, "#ffe7a6"), 0.4 * gleam)
     wax = palette(0.5 + 0.14 * fine + 0.12 * wide + 0.2 * own, "#c08c3c", "#d9ae60", "#ebcb8a", "#f3deab")
     cap = shade(wax, 0.22 * (depth - 0.5) * comb.seen + 0.08 * fine)
     color = mix(mix(honey, cap, sealed), shade(wax, 0.06 * fine - 0.06), wall)
-    height = mix(-0.0016 - 3e-4 * depth + 1.2e-3 * sealed * (0.6 + 0.6 * depth), 0 * wall, wall) + 1.2e-5 * fine * np.maximum(wall, sealed) + 8e-4
+    height = (
+        mix(-0.0016 - 3e-4 * depth + 1.2e-3 * sealed * (0.6 + 0.6 * depth), 0 * wall, wall)
+        + 1.2e-5 * fine * np.maximum(wall, sealed)
+        + 8e-4
+    )
     rough = mix(mix(0.10 + 0 * fine, 0.55 + 0.05 * fine, sealed), 0.5 + 0.05 * fine, wall)
     return Look(tint(color, 0.04 * wide), np.clip(rough, 0.04, 1), 0.0, height)
 
@@ -265,14 +324,21 @@ def sponge(at: Place) -> Look:
     bent = warped(at, 0.0010, 0.006, 1, 4)
     fine = fbm(at, Spectrum(0.0014, 0.0001, 1.05, tails=0.5, skew=-0.2, patch=0.4), 2)
     wide = fbm(at, Spectrum(0.05, 0.003, 0.8, patch=0.4), 3)
-    color, height = palette(0.55 + 0.10 * wide + 0.14 * fine, "#b98a35", "#d4a94f", "#e6c272", "#efd391"), 5e-5 * fine + 4e-4 * wide
-    for k, (size, radius, share) in enumerate(((0.0013, 0.0005, 0.9), (0.0030, 0.0012, 0.85), (0.0068, 0.0028, 0.8), (0.015, 0.0055, 0.45))):
-        hole = spots(bent, size, (0.3 * radius, radius), share, 4 + k)
+    color, height = (
+        palette(0.55 + 0.10 * wide + 0.14 * fine, "#b98a35", "#d4a94f", "#e6c272", "#efd391"),
+        5e-5 * fine + 4e-4 * wide,
+    )
+    for k, (size, radius, share) in enumerate(
+        ((0.0013, 0.0005, 0.9), (0.0030, 0.0012, 0.85), (0.0068, 0.0028, 0.8), (0.015, 0.0055, 0.45))
+    ):
+        hole = spots(bent, size, (0.5 * radius, 1.15 * radius), share, 4 + k)
         deep = np.clip(hole.inside / (0.7 * radius), 0, 1)
         floor = palette(0.75 - 0.75 * deep + 0.1 * fine, "#3a260c", "#6f4c19", "#a37a30", "#c79c48")
         color = mix(color, floor, 0.92 * hole.cover)
         height = height - hole.cover * 0.9 * radius * np.sqrt(deep)
-    return Look(tint(shade(color, 0.09 * fine), 0.04 * noise(at, 0.02, 9)), np.clip(0.92 + 0.03 * fine, 0, 1), 0.0, height + 6e-4)
+    return Look(
+        tint(shade(color, 0.09 * fine), 0.04 * noise(at, 0.02, 9)), np.clip(0.92 + 0.03 * fine, 0, 1), 0.0, height + 6e-4
+    )
 
 
 LOOKS = {
@@ -281,6 +347,6 @@ LOOKS = {
     "honeycomb": honeycomb, "sponge": sponge,
 }  # fmt: skip
 METRES = {
-    "skin": 0.04, "bone": 0.12, "horn": 0.2, "fur": 0.2, "feathers": 0.24, "bread": 0.12, "chocolate": 0.12, "cheese": 0.2,
+    "skin": 0.04, "bone": 0.12, "horn": 0.2, "fur": 0.16, "feathers": 0.24, "bread": 0.12, "chocolate": 0.12, "cheese": 0.2,
     "meat": 0.16, "orange peel": 0.06, "tomato skin": 0.06, "seashell": 0.1, "honeycomb": 0.07, "sponge": 0.1,
 }  # fmt: skip

@@ -9,11 +9,11 @@ from stages.material.place import Place
 
 
 def sheet(at: Place, stops: tuple[str, ...], hairs: tuple[str, ...], strength: float) -> tuple[Array, Array, Array]:
-    """Felted fibres. hairs: colours of single ones. Returns: colours (3, P); fine structure, deviation 1, and cover by fibres."""
+    """Felted fibres. hairs: colours of single ones. Returns: colours (3, P); fine structure; cover by fibres."""
     flat = at.flat
     cloud = fbm(warped(flat, 0.001, 0.006, 1, 2), Spectrum(0.012, 0.0008, 0.9, patch=0.4), 2)
     fine = fbm(flat, Spectrum(0.0016, 0.0001, 1.05, (1.3, 0.8, 1), 0.4, -0.1, 0.4), 3)
-    color = palette(0.5 + 0.12 * cloud + 0.14 * fine, *stops)
+    color = palette(0.5 + 0.08 * cloud + 0.14 * fine, *stops)
     cover = np.zeros(len(at), np.float32)
     for k in range(2):
         fibre = marks(at, 0.0042, 0.00010, 7, 1.2 * k, 6.28, 4 + k, 0.7, 0.7)
@@ -26,26 +26,34 @@ def paper(at: Place) -> Look:
     """Uncoated white paper: cloudy where held to the light, fine fibres, a faint tooth."""
     color, fine, fibre = sheet(at, ("#dfddd5", "#e9e7e0", "#f0efe9"), ("#d8d5cb", "#f4f3ee", "#e2dfd6"), 0.5)
     color = shade(color, 0.012 * fine)
-    return Look(color, np.clip(0.9 + 0.03 * fine - 0.03 * fibre, 0, 1), 0.0, 6e-6 * fine + 8e-6 * fibre)
+    return Look(color, np.clip(0.9 + 0.03 * fine - 0.03 * fibre, 0, 1), 0.0, 3e-6 * fine + 4e-6 * fibre)
 
 
 def printed(at: Place, width: float, leading: float, weight: float, seed: int) -> Array:
     """Lines of something like letters: words of hashed stems, bowls and bars. width, leading: of a letter and a line, metres.
-    Returns: (P,) share of the footprint that ink covers. """
+    Returns: (P,) share of the footprint that ink covers."""
     x, column, wide = repeats(at, width, 0)
     y, row, tall = repeats(at, leading, 1)
+
     def dice(number: int, step: float = 0.0) -> Array:
         """A number of the letter at hand."""
-        h = (column.astype(np.int64) + int(step)) * 0x8DA6B343 ^ row.astype(np.int64) * 0xD8163841 ^ (at.seed * 977 + seed) * 0x9E3779B1
+        h = (
+            (column.astype(np.int64) + int(step)) * 0x8DA6B343
+            ^ row.astype(np.int64) * 0xD8163841
+            ^ (at.seed * 977 + seed) * 0x9E3779B1
+        )
         return random_numbers((h & 0xFFFFFFFF).astype(np.uint32), number)
+
     a, b = x * np.float32(wide / 2), y * np.float32(tall / 2)
     stem, high = np.float32(weight / 2), np.float32(0.22 * tall)
     left, right = abs(a + 0.26 * wide), abs(a - 0.26 * wide)
     top, ascends, drops = dice(1), dice(2) < 0.22, dice(3) < 0.12
     upper = np.where(ascends, 1.75 * high, high)
     lower = np.where(drops, 1.7 * high, high)
+
     def bar(distance: Array, shown: Array) -> Array:
         return edge(stem - distance, at.footprint) * shown
+
     body = (b < upper) & (b > -lower)
     middle = (abs(b) < high + stem) & (abs(a) < 0.26 * wide + stem)
     ink = np.maximum(bar(left, body & (top < 0.8)), bar(right, (abs(b) < high) & (dice(4) < 0.6)))
@@ -67,7 +75,7 @@ def newspaper(at: Place) -> Look:
     bled = warped(flat, 0.00004, 0.0004, 11, 1)
     place = Place(bled.p, bled.p[:2], at.face, at.footprint, at.period, at.seed)
     across, _, column = repeats(at, 0.048, 0)
-    up, block, story = repeats(at, 0.06, 1)
+    up, _, story = repeats(at, 0.06, 1)
     from_top = (1 - up) * np.float32(story / 2)
     text = edge((1 - abs(across)) * np.float32(column / 2) - 0.002, at.footprint)
     head = (from_top < 0.0115).astype(np.float32)
@@ -108,8 +116,13 @@ def cardboard(at: Place) -> Look:
     scuff = masked(warped(at.flat, 0.003, 0.02, 12, 3), Spectrum(0.05, 0.0006, 0.9, patch=0.6), 0.07, 13, 0.4)
     wide = fbm(at.flat, Spectrum(0.2, 0.004, 0.8, (1, 2, 1)), 14)
     color = shade(color, 0.04 * fine + 0.025 * wave + 0.03 * wide - 0.5 * speck)
-    color = mix(color, palette(0.5 + 0.2 * fine, "#c6a27a", "#d8b993"), 0.4 * scuff)
-    return Look(color, np.clip(0.88 + 0.04 * fine - 0.03 * wave + 0.05 * scuff, 0, 1), 0.0, 6e-5 * wave + 1e-5 * fine + 1.2e-5 * fibre - 1e-5 * scuff)
+    color = mix(color, palette(0.5 + 0.2 * fine, "#c09a6c", "#d0ad80"), 0.3 * scuff)
+    return Look(
+        color,
+        np.clip(0.88 + 0.04 * fine - 0.03 * wave + 0.05 * scuff, 0, 1),
+        0.0,
+        6e-5 * wave + 1e-5 * fine + 1.2e-5 * fibre - 1e-5 * scuff,
+    )
 
 
 def corrugated_cardboard(at: Place) -> Look:
@@ -123,7 +136,12 @@ def corrugated_cardboard(at: Place) -> Look:
     wave = np.cos(np.pi * flute) * shown * (1 - 0.6 * dent)
     crease = cracks(bent, 0.03, 0.0005, 0.2, 14, 2, 0.05, (2.2, 0.6, 1)).cover
     color = shade(color, 0.30 * wave + 0.04 * fine - 0.12 * dent - 0.15 * crease - 0.02 * shown)
-    return Look(color, np.clip(0.88 + 0.04 * fine - 0.05 * wave, 0, 1), 0.0, 0.0015 * wave - 4e-4 * dent + 1e-5 * fine + 1.2e-5 * fibre - 1e-4 * crease)
+    return Look(
+        color,
+        np.clip(0.88 + 0.04 * fine - 0.05 * wave, 0, 1),
+        0.0,
+        0.0015 * wave - 4e-4 * dent + 1e-5 * fine + 1.2e-5 * fibre - 1e-4 * crease,
+    )
 
 
 LOOKS = {

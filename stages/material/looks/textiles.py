@@ -32,7 +32,7 @@ from stages.material.place import Place
 class Cloth(NamedTuple):
     """warp, weft: sRGB colours of threads from dark to light. pitch: from thread to thread, metres. fill: width of a thread, of
     the pitch. slub: how much a thread's thickness and dye vary along it. stray: how far threads leave their line, of the
-    pitch. fuzz: of loose fibres. fade: of the whole, wide. depth: of the shade between threads. """
+    pitch. fuzz: of loose fibres. fade: of the whole, wide. depth: of the shade between threads."""
 
     warp: tuple[str, ...]
     weft: tuple[str, ...]
@@ -48,13 +48,28 @@ class Cloth(NamedTuple):
 
 
 CLOTHS = {
-    "denim": Cloth(("#11233f", "#19335a", "#2b4d7b", "#486c97"), ("#4d6080", "#74859e"), 0.0008, "twill 3/1", 0.95, 0.15, fade=0.14),
+    "denim": Cloth(
+        ("#11233f", "#19335a", "#2b4d7b", "#486c97"), ("#4d6080", "#74859e"), 0.0008, "twill 3/1", 0.95, 0.15, fade=0.14
+    ),
     "fabric": Cloth(("#9c9483", "#b4ab99", "#c4bcab"), ("#a59c8a", "#bbb2a1", "#cbc4b4"), 0.0007, slub=0.08, stray=0.15),
-    "canvas": Cloth(("#ac9f82", "#c5b899", "#d8cdb2"), ("#b3a688", "#cabd9f", "#ddd3ba"), 0.0012, "basket", 0.94, 0.16, 0.3),
-    "linen": Cloth(("#a69472", "#c2b18d", "#d8caa9"), ("#ae9d7b", "#cbbb98", "#e0d4b6"), 0.0006, "plain", 0.86, 0.3, 0.45, 0.1, 0.07),
-    "burlap": Cloth(("#71542d", "#977545", "#b9955f"), ("#7a5c33", "#a27f4e", "#c29f6a"), 0.0022, "plain", 0.72, 0.3, 0.4, 0.16, 0.08, 1.1, 0.95),
-    "wool": Cloth(("#4c4844", "#655f59", "#827b72"), ("#5b5650", "#78716a", "#989086"), 0.0011, "twill 2/2", 0.96, 0.2, 0.35, 0.16, 0.06, 0.6, 0.95),
-    "silk": Cloth(("#b79a6b", "#cbb083", "#dbc49c"), ("#b79a6b", "#cbb083", "#dbc49c"), 0.00022, "satin", 0.97, 0.09, 0.2, 0.03, 0.05, 0.3, 0.4),
+    "canvas": Cloth(
+        ("#ac9f82", "#c5b899", "#d8cdb2"), ("#b3a688", "#cabd9f", "#ddd3ba"), 0.0012, "basket", 0.94, 0.16, 0.3
+    ),
+    "linen": Cloth(
+        ("#a69472", "#c2b18d", "#d8caa9"), ("#ae9d7b", "#cbbb98", "#e0d4b6"), 0.0006, "plain", 0.86, 0.3, 0.45, 0.1, 0.07
+    ),
+    "burlap": Cloth(
+        ("#71542d", "#977545", "#b9955f"), ("#7a5c33", "#a27f4e", "#c29f6a"), 0.0022, "plain", 0.72, 0.3, 0.4, 0.16, 0.08,
+        1.1, 0.95,
+    ),
+    "wool": Cloth(
+        ("#4c4844", "#655f59", "#827b72"), ("#5b5650", "#78716a", "#989086"), 0.0011, "twill 2/2", 0.96, 0.2, 0.35, 0.16, 0.06,
+        0.6, 0.95,
+    ),
+    "silk": Cloth(
+        ("#b79a6b", "#cbb083", "#dbc49c"), ("#b79a6b", "#cbb083", "#dbc49c"), 0.00022, "satin", 0.97, 0.06, 0.2, 0.02, 0.05,
+        0.16, 0.4,
+    ),
 }  # fmt: skip
 
 
@@ -79,7 +94,9 @@ def yarn(flat: Place, pitch: float, warp: Array, seed: int) -> tuple[Array, Arra
     up, across = fbm(flat, along, seed), fbm(flat, along._replace(stretch=(1, 0.06, 1)), seed + 1)
     lean = np.where(warp > 0.5, flat.p[1], -flat.p[1])
     fibres = fbm(
-        flat.moved(np.stack([lean, 0 * lean, 0 * lean])), Spectrum(0.5 * pitch, 0.1 * pitch, 1.0, (1, 4, 1), 0.4, -0.1, 0.4), seed + 2
+        flat.moved(np.stack([lean, 0 * lean, 0 * lean])),
+        Spectrum(0.5 * pitch, 0.1 * pitch, 1.0, (1, 4, 1), 0.4, -0.1, 0.4),
+        seed + 2,
     )
     return mix(across, up, warp), fibres
 
@@ -174,6 +191,7 @@ SETT = (("#7a1a20", 8), ("#1c2a22", 1), ("#7a1a20", 2), ("#1d3b2c", 9), ("#c9a53
 def striped(within: Array, footprint: Array, length: float) -> Array:
     """The sett's colours. Args: within (P,) −1 … 1; length of the sett, metres. Returns: (3, P)."""
     total = sum(count for _, count in SETT)
+    color: Array
     x, color, start = (within + 1) / 2 * length, np.zeros((3, len(within)), np.float32), 0.0
     for stop, count in SETT:
         end = start + count / total * length
@@ -186,7 +204,6 @@ def striped(within: Array, footprint: Array, length: float) -> Array:
 def tartan(at: Place) -> Look:
     """Twill whose warp and weft repeat the same stripes: squares of pure colour where they meet, mixed ones elsewhere."""
     kind = Cloth((), (), 0.0008, "twill 2/2", 0.95, 0.14, 0.2, 0.10, 0.05, 0.7)
-    flat = at.flat
     draw, warp, rise, vary = threads(at, kind)
     mean = usual(weave, kind.pitch, kind.draft, kind.fill)["height"]
     bands = [striped(within, at.footprint, fitted) for within, _, fitted in (repeats(at, 0.13, axis) for axis in (0, 1))]
@@ -218,7 +235,9 @@ def wool_knit(at: Place) -> Look:
     color = relieved(shade(color, 0.10 * ply + 0.09 * fibre), rise, mean, 0.95)
     color = mix(color, palette(hair.random(1), "#cfc4ac", "#ece5d6"), 0.35 * hair.cover)
     height = 0.0018 * (rise - mean) + 1.5e-4 * ply + 6e-5 * fibre + 1e-4 * hair.cover
-    return Look(tint(color, 0.02 * noise(flat, 0.03, 8)), np.clip(0.92 + 0.03 * fibre - 0.08 * (rise - mean), 0, 1), 0.0, height)
+    return Look(
+        tint(color, 0.02 * noise(flat, 0.03, 8)), np.clip(0.92 + 0.03 * fibre - 0.08 * (rise - mean), 0, 1), 0.0, height
+    )
 
 
 def felt(at: Place) -> Look:
@@ -230,7 +249,10 @@ def felt(at: Place) -> Look:
     height = 4e-5 * cloud + 3e-5 * fine
     for k, tone in enumerate(("#4c5d54", "#66786d", "#87998d")):
         hair = marks(at, 0.009 - 0.002 * k, 0.00022, 9, 1.1 * k, 6.28, 6 + k, 0.6, 0.9)
-        color, height = mix(color, shade(palette(0 * fine, tone), 0.3 * (hair.random(1) - 0.5)), 0.5 * hair.cover), height + 4e-5 * hair.cover
+        color, height = (
+            mix(color, shade(palette(0 * fine, tone), 0.3 * (hair.random(1) - 0.5)), 0.5 * hair.cover),
+            height + 4e-5 * hair.cover,
+        )
     color = tint(shade(color, 0.03 * cloud + 0.06 * fine), 0.05 * noise(flat, 0.01, 12))
     return Look(color, np.clip(0.95 + 0.03 * fine, 0, 1), 0.0, height - 1e-4)
 
@@ -289,13 +311,15 @@ def corduroy(at: Place) -> Look:
     """Cotton pile in upright wales, worn paler along their backs, the ground weave in the furrows."""
     flat = at.flat
     bent = strayed(flat, 0.003, 0.0002, 1)
-    across, wale, pitch = repeats(bent, 0.0032, 0)
+    across, _, pitch = repeats(bent, 0.0032, 0)
     shown = fading(pitch / 2, at.footprint)
     back = (np.sqrt(np.clip(1 - across * across, 0, 1)) - 0.785) * shown
-    pile_of = fbm(flat, Spectrum(0.0012, 0.00012, 1.0, (0.6, 1.5, 1), 0.5, -0.1, 0.4), 3)
-    cross = fbm(flat, Spectrum(0.0022, 0.0004, 0.95, (1.4, 0.6, 1), 0.3, patch=0.5), 4)
+    pile_of = fbm(flat, Spectrum(0.0008, 0.0001, 1.0, (0.9, 1.1, 1), 0.3, 0.1, 0.2), 3)
+    cross = fbm(flat, Spectrum(0.0026, 0.0004, 0.9, (1.2, 0.8, 1), 0.2, patch=0.3), 4)
     worn = fbm(flat, Spectrum(0.12, 0.004, 0.8, (1, 1.5, 1), patch=0.5), 5)
-    color = palette(0.45 + 0.10 * pile_of + 0.03 * cross + 0.04 * worn + 0.12 * back, "#4a3a2a", "#6a543d", "#8a7054", "#a58b6e")
+    color = palette(
+        0.45 + 0.10 * pile_of + 0.03 * cross + 0.04 * worn + 0.12 * back, "#4a3a2a", "#6a543d", "#8a7054", "#a58b6e"
+    )
     color = color * np.maximum(1 + 0.95 * back, 0.05)
     color = tint(shade(color, 0.08 * pile_of + 0.02 * cross), 0.04 * noise(flat, 0.02, 6))
     height = 0.0010 * back + 4e-5 * pile_of + 4e-5 * cross
@@ -332,7 +356,9 @@ def wicker(at: Place) -> Look:
     color = averaged(own, 0.14 * (1 - loops.seen), "#76502a", "#9c7140", "#bd925a", "#d3af7a")
     color = relieved(shade(color, 0.08 * grain + 0.05 * stain), rise, mean, 1.25)
     rough = 0.58 - 0.16 * (rise - mean) + 0.04 * grain
-    return Look(tint(color, 0.1 * (loops.random(2) - 0.5) * loops.seen), np.clip(rough, 0, 1), 0.0, 0.004 * (rise - mean) + 4e-5 * grain)
+    return Look(
+        tint(color, 0.1 * (loops.random(2) - 0.5) * loops.seen), np.clip(rough, 0, 1), 0.0, 0.004 * (rise - mean) + 4e-5 * grain
+    )
 
 
 def straw(at: Place) -> Look:
@@ -345,7 +371,7 @@ def straw(at: Place) -> Look:
     for k in range(4):
         stalk = marks(at, 0.12, 0.0048, 9, 0.7 + 0.9 * k, 2.6, 2 + k, 0.5, 0.08)
         inside = abs(stalk.across) < 2
-        side = np.where(inside, stalk.across, 0)
+        side = np.clip(np.where(inside, stalk.across, 0), -1, 1)
         rib = np.cos(np.pi * (4 * side + 3 * stalk.random(3))) * fading(0.001, at.footprint)
         node = np.exp(-(((stalk.along - 1.4 * (stalk.random(4) - 0.5)) / 0.012) ** 2)) * (stalk.random(5) < 0.5)
         tone = each(stalk.random(1), 1.0, "#a3803c", "#c39c50", "#d8b568", "#e2c684", "#b58e48", "#ead6a2", "#93743a")
