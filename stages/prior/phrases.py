@@ -4,12 +4,12 @@ The grammar is that of a buyer's list, not of English: a phrase is a run of word
 join them ("with", "covered in", "peeling off"); parts ("sole", "rim") and patterns ("stripes") say where a phrase lies. What
 no table knows, a dictionary may explain by colours; the rest is kept as unknown. """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from stages.prior.objects import OBJECTS
 from stages.prior.places import PARTS, SHAPES, SHOWS, Region
-from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED, ROOFS
+from stages.prior.stuffs import BOARDS, COATINGS, GENERIC, KNOWN, PATTERNED, ROOFS
 from stages.prior.tokens import Join, Token, tokens_of
 
 FIRST = Join("")
@@ -51,6 +51,11 @@ class Phrase:
         return bool(self.colors) and not (self.substance or self.thing or self.animal or self.unknown)
 
     @property
+    def coats(self) -> bool:
+        """Whether it is a thin coat on something, such as paint."""
+        return bool(self.substance) and (_family(self.substance) == "paint" or self.substance in COATINGS)
+
+    @property
     def empty(self) -> bool:
         """Whether it says nothing at all."""
         return not (self.says_what or self.region or self.finish or self.weather or self.size)
@@ -61,10 +66,16 @@ class Phrase:
         return kinds.get(kind, self.size)
 
 
-def split(prompt: str, explained: Mapping[str, Sequence[str]] | None = None) -> list[Phrase]:
-    """The phrases of a prompt, in its order; at least one. Args: explained: a dictionary, as `Vocabulary` has."""
+def split(
+    prompt: str, explained: Mapping[str, Sequence[str]] | None = None, matters: Callable[[str], bool] = bool
+) -> list[Phrase]:
+    """The phrases of a prompt, in its order; at least one.
+
+    Args:
+        explained: a dictionary, as `Vocabulary` has. matters: whether a word that no table knows may mean a material.
+    """
     phrases = [Phrase()]
-    tokens = tokens_of(prompt, explained or {})
+    tokens = [token for token in tokens_of(prompt, explained or {}) if token.kind != "unknown" or matters(token.text)]
     for number, token in enumerate(tokens):
         now, following = phrases[-1], tokens[number + 1] if number + 1 < len(tokens) else Token("end", "")
         join = _join_of(token, now, following)
@@ -102,7 +113,7 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
             return None
         return Join(token.value, True) if now.says_what and not now.animal else None
     if token.kind == "half":
-        return None if now.empty else Join("half")
+        return Join("half")
     if token.kind != "join":
         return None
     if token.value.kind in ("peel", "through") and following.kind in ("comma", "end", "join"):
@@ -152,6 +163,8 @@ def _name(phrase: Phrase, text: str) -> None:
     phrase.boards = phrase.boards or text in BOARDS
     if not old:
         phrase.substance = text
+    elif old.endswith("plated"):
+        return  # "silver-plated copper"
     elif text in BOARDS or (text in GENERIC and _family(old) == _family(text)):
         return  # the first says which
     else:
@@ -179,8 +192,12 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             _show(result, phrase)
         elif before and not phrase.says_what and not phrase.region:  # "bronze, polished"
             whole = result[0] if before.region and phrase.join.kind == "comma" else before  # "a boot with a red sole, worn"
+            if any(word in SHOWS for word in phrase.weather):
+                whole = next((p for p in result if p.coats), whole)  # "green paint over wood, peeling"
             whole.finish += phrase.finish
-            whole.weather += [word for word in phrase.weather if word not in whole.weather]
+            _add(whole.weather, phrase.weather)
+        elif before and _wears(before, phrase):
+            _add(before.weather, phrase.weather or [WEARS[phrase.where]])
         elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
             _describe(before, phrase)
         elif after and _heads(phrase, after):
@@ -190,6 +207,22 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
         else:
             result.append(phrase)
     return _in_pairs(result)
+
+
+WEARS = {**dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained"}
+"""Patterns that are wear where no stuff is named for them."""
+
+
+def _wears(before: Phrase, phrase: Phrase) -> bool:
+    """Whether a phrase says how the one before is worn: "with scratches"; "painted wood, the paint worn at the edges"."""
+    if phrase.where in WEARS and not phrase.says_what:
+        return True
+    again = phrase.coats and before.coats and not phrase.colors and not before.region
+    return again and any(word in SHOWS for word in phrase.weather)
+
+
+def _add(words: list[str], more: list[str]) -> None:
+    words += [word for word in more if word not in words]
 
 
 def _heads(phrase: Phrase, after: Phrase) -> bool:
@@ -212,7 +245,7 @@ def _describe(before: Phrase, phrase: Phrase) -> None:
     before.colors += phrase.colors
     before.finish += phrase.finish
     before.unknown += phrase.unknown
-    before.weather += [word for word in phrase.weather if word not in before.weather]
+    _add(before.weather, phrase.weather)
 
 
 def _lend(before: Phrase, phrase: Phrase, after: Phrase | None, result: list[Phrase]) -> None:
@@ -239,10 +272,11 @@ def _in_pairs(phrases: list[Phrase]) -> list[Phrase]:
     """Colours side by side share what follows: "red and white striped canvas", "white with red and blue stripes"."""
     for number in range(len(phrases) - 2, -1, -1):
         first, second = phrases[number], phrases[number + 1]
-        if not first.color_only or first.region or second.join.kind not in ("and", "comma"):
+        if not first.color_only or first.region or second.join.kind not in ("and", "comma", "fade", "half"):
             continue
         first.thing = first.thing or ("" if second.where in PARTS else second.thing)
-        said = second.substance and (second.colors or _family(second.substance) not in ("metal", "gem"))
+        same = second.join.kind == "and" and _family(second.substance or "stone") not in ("metal", "gem")
+        said = second.substance and (second.colors or same)
         if said and second.where not in PARTS:
             first.substance, first.boards = second.substance, second.boards
         if number and second.region and second.where in SHAPES:

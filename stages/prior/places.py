@@ -76,7 +76,7 @@ SHAPES = _table(
      Region("patches", 0.35, 0.16, 0.7)),
     ("streaks, drips, runs, streaked, drippings, dripping", Region("streaks", 0.2, 0.12, 0.8)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
-    ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks of, lines, kintsugi, "
+    ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks, lines, kintsugi, "
      "lightning", Region("veins", 0.06, 0.22)),
 )  # fmt: skip
 """Patterns in which one thing lies on another."""
@@ -185,7 +185,8 @@ JOINED = {
     "patch": SHAPES["patches"],
     "streak": SHAPES["streaks"], "vein": SHAPES["veins"], "cap": Region("up", 0.4, 0.12, 0.4), "rim": PARTS["rim"],
     "tip": PARTS["tip"], "sole": PARTS["sole"], "handle": PARTS["handle"], "line": PARTS["lining"], "stud": SHAPES["studs"],
-    "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5), "bottom": PARTS["base"], "legs": PARTS["legs"],
+    "all": Region("all", 1.0), "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5),
+    "bottom": PARTS["base"], "legs": PARTS["legs"],
 }  # fmt: skip
 """Where a phrase lies that only its joining word tells."""
 

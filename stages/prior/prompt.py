@@ -17,10 +17,11 @@ from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
 from stages.prior.model import Prior
 from stages.prior.names import FINISHES, FINISHES_METAL
-from stages.prior.objects import OBJECTS, words
+from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Join, Phrase, split
 from stages.prior.places import (
     ANIMALS,
+    FADE,
     FADED,
     GATHERS,
     JOINED,
@@ -47,9 +48,6 @@ ALIKE = 0.55
 SIMILAR = 0.2
 """Distance in OKLab within which a named colour describes a stuff's own."""
 
-COATINGS = frozenset(words("plaster, stucco, enamel, gold leaf, gold foil, varnish, glaze, lacquer, black lacquer, gilding"))
-"""Thin coats that are no paint."""
-
 BESIDE = ("with", "over", "and", "comma", "on")
 """Joins that leave open where a phrase lies."""
 
@@ -71,21 +69,14 @@ class Reading:
     def recipe(self, prompt: str, seed: int) -> Recipe:
         """See `read_prompt`."""
         rest, said = measured(prompt)
-        phrases = split(rest, self._prior.vocabulary.explained)
+        phrases = split(rest, self._prior.vocabulary.explained, self._means_material)
         self._metres = self._metres or said or _usual_size(phrases)
-        base, over = _ordered(self._known(phrases))
+        base, over = _ordered(phrases)
         layers = self._base_layers(base)
         coat = layers.pop(0).coat
         for phrase in over:
             layers += self._over(phrase, coat)
         return Recipe(coat, tuple(_once(layers)), seed)
-
-    def _known(self, phrases: list[Phrase]) -> list[Phrase]:
-        """The phrases without words that mean no material, such as names of things that no table has."""
-        for phrase in phrases:
-            phrase.unknown = [word for word in phrase.unknown if self._means_material(word)]
-        kept = [phrase for phrase in phrases if not phrase.empty]
-        return kept or [Phrase()]
 
     def _base_layers(self, base: Phrase) -> list[Layer]:
         """The base's coat, as a layer, and what lies on it of itself: its weather, an animal's marks, a thing's own parts."""
@@ -115,13 +106,16 @@ class Reading:
         if phrase.region is None and (phrase.join.kind == "peel" or (peels and phrase.join.kind in BESIDE)):
             rest = replace(phrase, weather=[word for word in phrase.weather if word not in PEELS])
             return [Layer(coat, (PEELED,), 2e-4), *self._weather(rest, (PEELED,), beneath)]
-        if phrase.region is None and phrase.join.kind in ("on", "over") and _coats(phrase):
+        if phrase.region is None and phrase.join.kind in ("on", "over") and phrase.coats:
             return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (), beneath)]
         if phrase.animal:
             _, marks, region = ANIMALS[phrase.animal]
             marked = replace(beneath, color=_color(phrase) if phrase.colors else _triple(rgb(marks)), said=_said(phrase))
             return [Layer(marked, (region.mask(phrase.animal),))]
         mask = self._region(phrase).mask(phrase.where)
+        if phrase.join.kind == "fade":
+            downwards = bool(phrase.region) and mask.kind == "below"
+            mask = replace(FADE.mask(phrase.where), invert=downwards)
         return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,), beneath)]
 
     def _more(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
@@ -141,7 +135,7 @@ class Reading:
     def _region(self, phrase: Phrase) -> Region:
         """Where a phrase lies."""
         gathers = GATHERS.get(ONCE.get(phrase.substance, phrase.substance))
-        if phrase.region and gathers and phrase.region.kind == "above" and phrase.where.startswith("on "):
+        if phrase.region and gathers and phrase.region.kind == "above" and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", 0.45, gathers.size, gathers.wear)
         if phrase.region:
             return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region
@@ -262,7 +256,7 @@ class Reading:
         """What shows where a coat is worn through."""
         if phrase.shows:
             return self._coat(phrase.shows)
-        if under and _coats(phrase):
+        if under and phrase.coats:
             return under
         own = self._coat(phrase)
         family = KNOWN[phrase.substance][0].family if phrase.substance else ""
@@ -276,6 +270,9 @@ class Reading:
 
 def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
     """The base, and what lies over it from below: "spots on tan", "paint peeling off wood" name the upper one first."""
+    for after in phrases[1:]:
+        if after.join.kind == "below" and (after.coats or after.substance in GATHERS):
+            after.join = Join("over")  # "iron under peeling paint"
     base = 0
     while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
         base += 1
@@ -309,11 +306,6 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
     if first.thing in TABLES:
         over = [replace(p, region=TABLE_PARTS.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
     return first, over
-
-
-def _coats(phrase: Phrase) -> bool:
-    """Whether it is a thin coat on something."""
-    return bool(phrase.substance) and (_family(phrase) == "paint" or phrase.substance in COATINGS)
 
 
 def _covers(phrase: Phrase) -> bool:

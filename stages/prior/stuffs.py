@@ -54,8 +54,13 @@ PATTERNED = frozenset(words(
 ))  # fmt: skip
 """Names of what is laid of pieces: a name before one of them is what the pieces are made of."""
 
-ROOFS = dict.fromkeys(("terracotta", "clay", "tile", "tiles", "tiled", "earthenware"), "roof tiles")
+ROOFS = {
+    **dict.fromkeys(("terracotta", "clay", "tile", "tiles", "tiled", "earthenware"), "roof tiles"), "tin": "galvanized steel",
+}  # fmt: skip
 """What a roof is laid of, where words name its stuff."""
+
+COATINGS = frozenset(words("plaster, stucco, enamel, gold leaf, gold foil, varnish, glaze, lacquer, black lacquer, gilding"))
+"""Thin coats that are no paint."""
 
 FINISH_LOOKS = {
     "beaten": "hammered", "forged": "hammered", "dented": "hammered", "burnished": "polished", "mirror": "polished",

@@ -23,7 +23,8 @@ FILLER = words(
     "texturing, finish, finished, print, pattern, patterned, style, both, each, that, which, it, lots of, bits of, pieces of, "
     "layer of, a bit of, a few, many, thick, thin, small amounts of, around, along, growing, underneath, on it, all over, "
     "everywhere, s, this, their, other, one, simple, nice, piece of, block of, part, piece, parts, half-timbered, out, "
-    "coat of, coats of, coating of, splash of, touch of, set of, pair of, sheet of, slab of, lump of, was, were, be, for, as"
+    "coat of, coats of, coating of, splash of, touch of, set of, pair of, sheet of, slab of, lump of, was, were, be, for, as, "
+    "tint, hue, tone, sheen, shine, glow, glowing, like"
 )
 """Words that say nothing of a material."""
 
@@ -68,6 +69,7 @@ JOINS = {
     **_joins("through", "showing through, shining through, visible through, peeking through, visible under, "
              "visible beneath", True),
     **_joins("fade", "fading into, fading to, fades into, fades to, blending into, blending to, turning into, turning to, "
+             "turns into, turns to, becoming, becomes, "
              "transitioning to, transitioning into, gradient to, merging into, melting into, dissolving into, changing into"),
     **_joins("on", "on, onto, atop, upon, across, out of, growing on, growing out of, growing from, emerging from, mounted on, "
              "standing on, sitting on, resting on, lying on, painted on, painted onto, printed on, splashed on", True),
@@ -170,6 +172,8 @@ def _resolved(found: list[Token]) -> list[Token]:
         names = {t.kind for t in ahead} & {"substance", "thing"}
         if token.text in COLORS and token.kind in ("substance", "thing"):
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.kind == "thing") for t in ahead)
+            if token.kind == "substance" and KNOWN[token.text][0].family != "gem":
+                names -= {"thing"}  # "an ivory comb", but "an emerald car"
             if names or shaped or any(t.kind == "substance" for t in behind):
                 token = Token("color", token.text)
         if token.kind == "color" and token.article and not ahead and token.text in OBJECTS:

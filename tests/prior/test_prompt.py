@@ -143,8 +143,10 @@ def test_weather_is_laid_once(read, prompt: str, stuffs: list[str]) -> None:  # 
 @pytest.mark.parametrize(
     ("prompt", "look"),
     [("brushed steel", "brushed steel"), ("hammered copper", "hammered copper"), ("polished brass", "polished brass"),
-     ("cast iron", "cast iron"), ("beaten silver", "hammered silver"), ("oak planks", "oak boards"), ("pine floorboards", "pine boards"),
-     ("a terracotta roof", "roof tiles"), ("oak", "oak"), ("stone wall", "rock wall"), ("red brick", "brick"), ("tartan", "tartan"),
+     ("cast iron", "cast iron"), ("beaten silver", "hammered silver"), ("oak planks", "oak boards"),
+     ("pine floorboards", "pine boards"),
+     ("a terracotta roof", "roof tiles"), ("oak", "oak"), ("stone wall", "rock wall"), ("red brick", "brick"),
+     ("tartan", "tartan"),
      ("crocodile leather", "scales"), ("corten steel", "rusty steel"), ("green marble", "green marble")],
 )  # fmt: skip
 def test_names_and_finishes_call_for_their_looks(read, prompt: str, look: str) -> None:  # type: ignore[no-untyped-def]
