@@ -135,7 +135,7 @@ class Reading:
     def _region(self, phrase: Phrase) -> Region:
         """Where a phrase lies."""
         gathers = GATHERS.get(ONCE.get(phrase.substance, phrase.substance))
-        if phrase.region and gathers and phrase.region.kind == "above" and phrase.where in ("on top", "on the top", "on top of it"):
+        if gathers and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", 0.45, gathers.size, gathers.wear)
         if phrase.region:
             return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region

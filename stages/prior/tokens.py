@@ -171,8 +171,8 @@ def _resolved(found: list[Token]) -> list[Token]:
         behind = _run(reversed(result))
         names = {t.kind for t in ahead} & {"substance", "thing"}
         if token.text in COLORS and token.kind in ("substance", "thing"):
-            shaped = any(t.kind == "shape" or (t.kind == "part" and token.kind == "thing") for t in ahead)
-            if token.kind == "substance" and KNOWN[token.text][0].family != "gem":
+            shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)
+            if token.text in KNOWN and KNOWN[token.text][0].family != "gem":
                 names -= {"thing"}  # "an ivory comb", but "an emerald car"
             if names or shaped or any(t.kind == "substance" for t in behind):
                 token = Token("color", token.text)
