@@ -32,7 +32,7 @@ LOOK_OF = {name: look for look, names in rows("looks.tsv") for name in words(nam
 FAMILY_LOOKS = {
     "metal": ("steel",), "rust": ("rust",), "wood": ("oak",), "stone": ("rock", "granite"),
     "ceramic": ("porcelain", "glossy plastic"),
-    "plastic": ("plastic",), "paint": ("paint",), "fabric": ("linen", "denim"), "leather": ("leather", "rubber"),
+    "plastic": ("plastic",), "paint": ("paint",), "fabric": ("fabric", "linen"), "leather": ("leather", "rubber"),
     "organic": ("skin", "wax"), "paper": ("paper", "foam"), "gem": ("glass",), "ice": ("snow", "foam"),
 }  # fmt: skip
 """Family → looks that stand in for one that is missing, the best first."""
@@ -71,7 +71,7 @@ FINISH_LOOKS = {
 """Words of finish → the finish whose look of a metal they call for."""
 
 
-PAINTABLE = frozenset(words("ceramic, plastic, paint, fabric, leather, paper, fruit peel, wax, skin, fur, feathers, scales"))
+PAINTABLE = frozenset(words("ceramic, plastic, paint, fabric, leather, paper, tomato skin, wax, skin, fur, feathers, scales"))
 """Families and looks that take any colour. Of others a colour that is like their own only describes them: "green moss"."""
 
 
