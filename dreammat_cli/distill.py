@@ -1,11 +1,13 @@
 """dreammat distill"""
 
+import functools
 from pathlib import Path
 from typing import Any
 
 import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from stages.core.progress import Tell, untold
 from stages.distill.options import GIVEN, LOSSES, QUALITY, DistillOptions
 from stages.sd.options import SdOptions
 
@@ -19,10 +21,35 @@ def weight(name: str, text: str) -> Any:
     return click.option(flag, type=UNIT, default=DEFAULT[name], show_default=True, metavar="X", help=text)
 
 
+def understood(options: DistillOptions) -> Any:
+    """The recipe that the prompt's words call for, before any mesh is known. Raises: InputError."""
+    from stages.core.errors import InputError
+    from stages.prior.model import load_prior
+    from stages.prior.prompt import read_prompt
+
+    if options.guidance != "prior":
+        raise InputError(f"--explain with --guidance {options.guidance}: it reads no words; expected --guidance prior")
+    if not options.prompt.strip():
+        raise InputError("--explain: no --prompt is given; say what the object is made of")
+    return read_prompt(options.prompt, load_prior(), options.seed, options.object_size)
+
+
+def explain_words(common: Common, options: DistillOptions) -> None:
+    """Print what is understood of the prompt, a row for each coat."""
+    from stages.prior.explain import HEADINGS, explained, table
+
+    recipe = understood(options)
+    rows = [dict(zip(HEADINGS, row, strict=True)) for row in explained(recipe)]
+    show(common, {"prompt": options.prompt, "metres": recipe.base.metres, "coats": rows}, table(recipe))
+
+
 @click.command()
 @click.argument("conditions", type=INPUT, metavar="CONDITIONS")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="MATERIAL.npz", help="The file to write.")
 @click.option("--prompt", default=DEFAULT["prompt"], metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
+@click.option("--object-size", type=click.FloatRange(1e-3, 1e4), default=DEFAULT["object_size"], metavar="METRES",
+              help="Length of its longest edge, which sizes bricks, grain and threads.  [default: what the words say]")
+@click.option("--explain", is_flag=True, help="Print what is understood of --prompt as a table, and stop.")
 @click.option("--negative-prompt", default=DEFAULT["negative_prompt"], show_default=True, metavar="TEXT",
               help="What the picture should not look like.")
 @click.option("--guidance", type=click.Choice(["prior", "sd", "reference"]), default=DEFAULT["guidance"], show_default=True,
@@ -60,19 +87,25 @@ def weight(name: str, text: str) -> Any:
 @click.option("--lights", type=click.Choice(("all", "one")), default=DEFAULT["lights"], show_default=True,
               help="Environments of CONDITIONS that steps are lit by; one: the first.")
 @common_options
-def command(conditions: Path, output: Path, common: Common, **chosen: Any) -> None:
+def command(conditions: Path, output: Path, common: Common, explain: bool, **chosen: Any) -> None:
     """Optimise the material of the mesh in the folder CONDITIONS until it looks like --prompt in every light.
 
     Stopped by Ctrl-C or a kill, the same command continues; on a CPU the result has the same bytes either way.
     """
     sd = SdOptions(**{name: chosen.pop(name) for name in SD})
     options = DistillOptions(**chosen, sd=sd)
+    if explain:
+        explain_words(common, options)
+        return
     if plan(common, "distill", output, options):
+        if options.guidance == "prior" and options.prompt.strip() and not common.as_json:
+            explain_words(common, options)
         return
     from stages.distill.stage import distill
 
+    tell: Tell = untold if common.quiet else functools.partial(click.echo, err=True)
     with reporter(common) as progress:
-        result = distill(conditions, output, options, common.force, progress)
+        result = distill(conditions, output, options, common.force, progress, tell)
     if result.up_to_date:
         show(common, {"output": str(output), "up_to_date": True}, [f"{output}: up to date"])
         return

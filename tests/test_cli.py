@@ -64,6 +64,19 @@ def test_dry_run_writes_nothing(mesh: Path, tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir()] == ["triangle.obj"]
 
 
+def test_what_is_understood_of_a_prompt_is_shown(tmp_path: Path) -> None:
+    words = ("distill", "c", "-o", "m.npz", "--prompt", "a boot, brown leather with a black rubber sole")
+    told = dreammat(*words, "--explain", cwd=tmp_path)
+    assert [line.split("  ")[0] for line in told.stdout.splitlines()] == ["what", "brown leather", "black rubber"]
+    assert "lowest 8 % (sole)" in told.stdout and told.stderr == ""
+    planned = dreammat(*words, "--dry-run", cwd=tmp_path)
+    assert planned.stdout.startswith("would distill m.npz") and planned.stdout.endswith(told.stdout)
+    data = json.loads(dreammat(*words, "--explain", "--json", "--object-size", "0.5", cwd=tmp_path).stdout)
+    assert data["metres"] == 0.5 and data["coats"][1]["what"] == "black rubber"
+    expect_error(dreammat("distill", "c", "-o", "m.npz", "--explain", cwd=tmp_path), INPUT, "--prompt")
+    assert not list(tmp_path.iterdir())
+
+
 def test_json_is_all_that_stdout_holds(mesh: Path, tmp_path: Path) -> None:
     result = dreammat("prep", mesh, "-o", tmp_path / "prep.npz", "--json")
     assert json.loads(result.stdout)["findings"]["triangles"] == 1

@@ -8,3 +8,11 @@ Progress = Callable[[str, int, int], None]
 
 def silent(what: str, done: int, total: int) -> None:
     """Report nothing."""
+
+
+Tell = Callable[[str], None]
+"""takes a line for people"""
+
+
+def untold(line: str) -> None:
+    """Tell nobody."""

@@ -16,7 +16,7 @@ from torch import Tensor
 from stages.core.artifact import Provenance, peek, plain_options, run_log, save_npz, write_text
 from stages.core.errors import InputError, NumericalError
 from stages.core.parallel import ahead, cores
-from stages.core.progress import Progress, silent
+from stages.core.progress import Progress, Tell, silent, untold
 from stages.core.schemas import MATERIAL
 from stages.core.shading import Material, shade
 from stages.distill import checkpoint, regularizers, schedule
@@ -31,8 +31,10 @@ from stages.distill.preview import write_preview
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
 from stages.distill.start import least_like_light
 from stages.distill.views import Views
-from stages.material.recipe import Recipe
+from stages.material.recipe import EVEN, Recipe
 from stages.material.residual import Residual, ResidualConfig, combined
+from stages.prior.explain import parts
+from stages.prior.sizes import LEAST, MOST
 
 SEEN_BY = 3
 """A surface point is taken to be seen by one view in this many."""
@@ -75,20 +77,22 @@ class Run:
 
 
 def distill(
-    conditions: Path, out: Path, options: DistillOptions, force: bool = False, progress: Progress = silent
+    conditions: Path, out: Path, options: DistillOptions, force: bool = False, progress: Progress = silent, tell: Tell = untold
 ) -> DistillResult:
     """Learn what to add to a recipe until its renderings under all views and lights please the guidance.
 
     Writes `out` (material.npz), `<stem>.curve.csv` and `<stem>.preview.png` beside it, and while it runs
-    `<out>.checkpoint`, from which the same call continues.
+    `<out>.checkpoint`, from which the same call continues. Tells what is read of the prompt, and where it lies.
 
     Raises: InputError, ArtifactError, OutputError, NumericalError; KeyboardInterrupt after saving a checkpoint.
     """
     with torch_threads(cores() if options.guidance == "sd" else 1):
-        return _distill(conditions, out, options, force, progress)
+        return _distill(conditions, out, options, force, progress, tell)
 
 
-def _distill(conditions: Path, out: Path, options: DistillOptions, force: bool, progress: Progress) -> DistillResult:
+def _distill(
+    conditions: Path, out: Path, options: DistillOptions, force: bool, progress: Progress, tell: Tell
+) -> DistillResult:
     device = chosen_device(options)
     views = Views(conditions)
     guidance = make_guidance(options, views, device)
@@ -102,6 +106,8 @@ def _distill(conditions: Path, out: Path, options: DistillOptions, force: bool, 
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
         run = Run(out, views, guidance, Base(guidance.recipe, views), options, budget, request, state, clock)
+        for line in parts(guidance.recipe) if guidance.recipe != EVEN else ():
+            tell(line)
         if not resumed:
             _preview(run)  # what the words alone give
         _all_steps(run, progress)
@@ -149,6 +155,8 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
         raise InputError(f"--guidance {options.guidance}: unknown; expected prior, sd or reference")
     if not options.prompt.strip():
         raise InputError("--prompt: empty; say what the object is made of, such as \"weathered bronze\"")
+    if options.object_size is not None and not LEAST <= options.object_size <= MOST:
+        raise InputError(f"--object-size {options.object_size:g}: expected {LEAST:g} to {MOST:g} metres")
     if options.guidance == "sd":
         return _stable_diffusion(options, views, device)
     from stages.distill.guidance import prior
@@ -159,7 +167,8 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
     sampler = CropSampler(views, model.size, options.batch, device, options.lights)
 
     def begin() -> Recipe:
-        return least_like_light(read_prompt(options.prompt, model, options.seed), views, step_generator(options.seed, POOL))
+        recipe = read_prompt(options.prompt, model, options.seed, options.object_size)
+        return least_like_light(recipe, views, step_generator(options.seed, POOL))
 
     return prior.PriorGuidance(model, sampler, options, begin)
 

@@ -5,10 +5,14 @@ from stages.material.recipe import Coat, Mask, Recipe
 HEADINGS = ("what", "where", "look", "colour", "roughness", "metal")
 
 PLACES = {
-    "all": "everywhere", "below": "lowest {}", "above": "highest {}", "front": "foremost {}", "back": "rearmost {}", "left": "left {}",
-    "right": "right {}", "fade": "fading in over the upper {}", "up": "{} facing up", "down": "{} facing down", "edges": "{} on edges",
-    "crevices": "{} in crevices", "hidden": "innermost {}", "spots": "spots, {}", "stripes": "stripes, {}", "bands": "bands, {}",
-    "checks": "checks, {}", "veins": "veins, {}", "patches": "patches, {}", "streaks": "streaks, {}", "scratches": "scratches, {}",
+    "all": "everywhere", "below": "lowest {}", "above": "highest {}", "front": "foremost {}", "back": "rearmost {}",
+    "left": "left {}",
+    "right": "right {}", "fade": "fading in over the upper {}", "up": "{} facing up", "down": "{} facing down",
+    "edges": "{} on edges",
+    "crevices": "{} in crevices", "hidden": "innermost {}", "spots": "spots, {}", "stripes": "stripes, {}",
+    "bands": "bands, {}",
+    "checks": "checks, {}", "veins": "veins, {}", "patches": "patches, {}", "streaks": "streaks, {}",
+    "scratches": "scratches, {}",
     "chips": "chips, {}",
 }  # fmt: skip
 """Kind of a mask → where it is, with its share."""
@@ -40,8 +44,7 @@ def place(mask: Mask) -> str:
     where = PLACES[mask.kind].format(share)
     if mask.invert:
         where = f"what is left of it, {share}"
-    said = mask.said.split(" ")[-1] if mask.said.startswith(("on ", "at ", "in ", "to ", "around ", "along ", "over ", "inside ")) else mask.said
-    return f"{where} ({said})" if said and said not in where else where
+    return f"{where} ({mask.said})" if mask.said and mask.said not in where else where
 
 
 def _row(coat: Coat, where: str) -> Row:

@@ -28,8 +28,10 @@ PARTS = _table(
     ("pedestal, plinth, stand, socle, foundation, foundations, hem, skirting", Region("below", 0.2)),
     ("foot, feet, legs, leg, paws, hooves, castors, casters, wheels, tyres, tires, stem, stalk", Region("below", 0.3)),
     ("top, upper half, upper part, top half, upper, upper section", Region("above", 0.5)),
-    ("lid, cap, cover, roof, hood, dome, crown, crest, hat, bonnet, lids, stopper, hair, comb, mane, ceiling", Region("above", 0.22)),
-    ("lower third, bottom third, lowest third", Region("below", 0.33)), ("lower quarter, bottom quarter", Region("below", 0.25)),
+    ("lid, cap, cover, roof, hood, dome, crown, crest, hat, bonnet, lids, stopper, hair, comb, mane, "
+     "ceiling", Region("above", 0.22)),
+    ("lower third, bottom third, lowest third", Region("below", 0.33)),
+    ("lower quarter, bottom quarter", Region("below", 0.25)),
     ("upper third, top third", Region("above", 0.33)), ("upper quarter, top quarter, capital", Region("above", 0.25)),
     ("shade, lampshade", Region("above", 0.5)),
     ("rim, lip, brim, collar, mouth, rims", Region("above", 0.06)),
@@ -46,7 +48,8 @@ PARTS = _table(
     ("belly, underbelly, bottom side", Region("down", 0.3)),
     ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "
      "edge trim, gilding, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
-     "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching", Region("edges", 0.1, 0.04, 0.1)),
+     "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching",
+     Region("edges", 0.1, 0.04, 0.1)),
     ("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams, crevice, "
      "carvings, engraved lines, creases, corners inside, cavities, pits", Region("crevices", 0.22, 0.08, 0.6)),
     ("inside, interior, lining, cavity, inner side", Region("hidden", 0.3, 0.05, 0.1)),
@@ -64,7 +67,8 @@ SHAPES = _table(
      Region("bands", 0.3, 0.22)),
     ("spots, spot, dots, polka dots, polka, spotted, dotted, speckles, freckles, flecks, speckled, flecked, polka-dotted",
      Region("spots", 0.3, 0.14)),
-    ("studs, rivets, buttons, knobs, bolts, nails, studded, riveted", Region("spots", 0.06, 0.07)),
+    ("studs, rivets, eyelets, grommets, sequins, screws, buttons, knobs, bolts, nails, studded, "
+     "riveted", Region("spots", 0.06, 0.07)),
     ("checks, checkered, chequered, checkerboard, squares, check, checked, check pattern, chessboard pattern",
      Region("checks", 0.5, 0.12)),
     ("patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, mottled, splashes, splatters, splattered, "
@@ -72,7 +76,8 @@ SHAPES = _table(
      Region("patches", 0.35, 0.16, 0.7)),
     ("streaks, drips, runs, streaked, drippings, dripping", Region("streaks", 0.2, 0.12, 0.8)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
-    ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks of, lines, kintsugi, lightning", Region("veins", 0.06, 0.22)),
+    ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks, lines, kintsugi, "
+     "lightning", Region("veins", 0.06, 0.22)),
 )  # fmt: skip
 """Patterns in which one thing lies on another."""
 
@@ -94,21 +99,28 @@ ANIMALS = {
 """Coats that everybody knows: ground, marks, and how these lie."""
 
 GATHERS = {
-    "moss": Region("crevices", 0.4, 0.18, 1.0), "rust": Region("chips", 0.4, 0.12, 1.0), "dirt": Region("crevices", 0.35, 0.15, 1.0),
+    "moss": Region("crevices", 0.4, 0.18, 1.0), "rust": Region("chips", 0.4, 0.12, 1.0),
+    "dirt": Region("crevices", 0.35, 0.15, 1.0),
     "mud": Region("below", 0.25, 0.15, 1.0), "soil": Region("crevices", 0.35, 0.15, 1.0), "snow": Region("up", 0.42, 0.12, 0.4),
-    "verdigris": Region("crevices", 0.35, 0.14, 1.0), "frost": Region("edges", 0.35, 0.1, 1.0), "ice": Region("up", 0.3, 0.15, 0.6),
-    "lichen": Region("patches", 0.25, 0.1, 1.0), "gold leaf": Region("patches", 0.5, 0.25, 0.8), "ash": Region("up", 0.45, 0.2, 1.0),
+    "verdigris": Region("crevices", 0.35, 0.14, 1.0), "frost": Region("edges", 0.35, 0.1, 1.0),
+    "ice": Region("up", 0.3, 0.15, 0.6),
+    "lichen": Region("patches", 0.25, 0.1, 1.0), "gold leaf": Region("patches", 0.5, 0.25, 0.8),
+    "ash": Region("up", 0.45, 0.2, 1.0),
     "soot": Region("patches", 0.4, 0.3, 1.0), "dust": Region("up", 0.5, 0.2, 1.0), "sand": Region("up", 0.4, 0.2, 1.0),
-    "ivy": Region("patches", 0.5, 0.2, 0.8), "leaves": Region("patches", 0.5, 0.12, 0.8), "algae": Region("below", 0.4, 0.15, 1.0),
-    "icing": Region("above", 0.45, 0.1, 0.6), "frosting": Region("above", 0.45, 0.1, 0.6), "icing sugar": Region("up", 0.45, 0.15, 1.0),
+    "ivy": Region("patches", 0.5, 0.2, 0.8), "leaves": Region("patches", 0.5, 0.12, 0.8),
+    "algae": Region("below", 0.4, 0.15, 1.0),
+    "icing": Region("above", 0.45, 0.1, 0.6), "frosting": Region("above", 0.45, 0.1, 0.6),
+    "icing sugar": Region("up", 0.45, 0.15, 1.0),
     "cobwebs": Region("crevices", 0.25, 0.12, 1.0), "grime": Region("crevices", 0.35, 0.15, 1.0),
-    "barnacles": Region("below", 0.4, 0.1, 1.0), "patina": Region("crevices", 0.35, 0.14, 1.0), "vines": Region("patches", 0.4, 0.15, 0.9),
-    "whipped cream": Region("above", 0.4, 0.1, 0.6), "blood": Region("patches", 0.3, 0.18, 0.8), "grass": Region("up", 0.45, 0.1, 0.8),
+    "barnacles": Region("below", 0.4, 0.1, 1.0), "patina": Region("crevices", 0.35, 0.14, 1.0),
+    "vines": Region("patches", 0.4, 0.15, 0.9),
+    "whipped cream": Region("above", 0.4, 0.1, 0.6), "blood": Region("patches", 0.3, 0.18, 0.8),
+    "grass": Region("up", 0.45, 0.1, 0.8),
 }  # fmt: skip
 """What gathers of itself, and where it does when nobody says."""
 
-ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt", "earth": "dirt",
-        "green patina": "verdigris", "copper patina": "verdigris", "oxidized copper": "verdigris"}
+ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt",
+        "earth": "dirt",         "green patina": "verdigris", "copper patina": "verdigris", "oxidized copper": "verdigris"}
 """Other names of what gathers."""
 
 LAYERED = {"moss": 3e-3, "snow": 8e-3, "rust": 2e-4, "grass": 5e-3}
@@ -133,7 +145,8 @@ WEATHER = _weather(
     ("rusty, rusted, rusting, corroded", Weather("rust", Region("chips", 0.42, 0.12, 1.0), 2e-4)),
     ("dirty, grimy, filthy, soiled", Weather("dirt", Region("crevices", 0.4, 0.15, 1.0), 1e-4, 0.85)),
     ("muddy", Weather("mud", Region("below", 0.3, 0.2, 1.0), 2e-4, 0.95)),
-    ("weathered, aged, old, ancient, antique, vintage, worn out", Weather("grime", Region("crevices", 0.3, 0.15, 1.0), 0.0, 0.55)),
+    ("weathered, aged, old, ancient, antique, vintage, "
+     "worn out", Weather("grime", Region("crevices", 0.3, 0.15, 1.0), 0.0, 0.55)),
     ("stained, water-stained, streaky", Weather("grime", Region("streaks", 0.3, 0.14, 0.9), 0.0, 0.6)),
     ("charred, burnt, burned, scorched, sooty", Weather("charcoal", Region("patches", 0.4, 0.3, 1.0), 0.0, 0.9)),
     ("tarnished", Weather("tarnish", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.8)),
@@ -166,11 +179,14 @@ PARTLY = Region("patches", 0.35, 0.2, 0.7)
 FADE = Region("fade", 0.5, 0.6)
 JOINED = {
     "cover": COVERED, "partly": PARTLY, "spots": Region("spots", 0.3, 0.14), "inlay": SHAPES["inlay"], "edge": PARTS["trim"],
-    "stripe": SHAPES["stripes"], "band": SHAPES["bands"], "with": PARTLY, "and": PARTLY, "comma": PARTLY, "on": PARTLY, "of": PARTLY,
-    "over": COVERED, "above": Region("above", 0.5), "below": Region("below", 0.5), "check": SHAPES["checks"], "patch": SHAPES["patches"],
+    "stripe": SHAPES["stripes"], "band": SHAPES["bands"], "with": PARTLY, "and": PARTLY, "comma": PARTLY, "on": PARTLY,
+    "of": PARTLY,
+    "over": COVERED, "above": Region("above", 0.5), "below": Region("below", 0.5), "check": SHAPES["checks"],
+    "patch": SHAPES["patches"],
     "streak": SHAPES["streaks"], "vein": SHAPES["veins"], "cap": Region("up", 0.4, 0.12, 0.4), "rim": PARTS["rim"],
     "tip": PARTS["tip"], "sole": PARTS["sole"], "handle": PARTS["handle"], "line": PARTS["lining"], "stud": SHAPES["studs"],
-    "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5), "bottom": PARTS["base"], "legs": PARTS["legs"],
+    "all": Region("all", 1.0), "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5),
+    "bottom": PARTS["base"], "legs": PARTS["legs"],
 }  # fmt: skip
 """Where a phrase lies that only its joining word tells."""
 

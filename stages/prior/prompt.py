@@ -6,6 +6,7 @@ same tables and explains other words by a dictionary, and look like the substanc
 from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Join, Phrase, split
 from stages.prior.places import (
     ANIMALS,
+    FADE,
     FADED,
     GATHERS,
     JOINED,
@@ -36,7 +38,7 @@ from stages.prior.places import (
     Region,
 )  # fmt: skip
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
-from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
+from stages.prior.stuffs import BOARDS, FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
 
 RGB = tuple[float, float, float]
 
@@ -46,8 +48,8 @@ ALIKE = 0.55
 SIMILAR = 0.2
 """Distance in OKLab within which a named colour describes a stuff's own."""
 
-COATINGS = frozenset(["plaster", "stucco", "enamel", "gold leaf", "gold foil", "varnish", "glaze", "lacquer", "black lacquer", "wallpaper", "gilding"])
-"""Thin coats that are no paint."""
+BESIDE = ("with", "over", "and", "comma", "on")
+"""Joins that leave open where a phrase lies."""
 
 UNSAID = "plaster"
 """What a thing is taken to be made of where neither words nor tables say."""
@@ -67,21 +69,14 @@ class Reading:
     def recipe(self, prompt: str, seed: int) -> Recipe:
         """See `read_prompt`."""
         rest, said = measured(prompt)
-        phrases = split(rest, self._prior.vocabulary.explained)
+        phrases = split(rest, self._prior.vocabulary.explained, self._means_material)
         self._metres = self._metres or said or _usual_size(phrases)
-        base, over = _ordered(self._known(phrases))
+        base, over = _ordered(phrases)
         layers = self._base_layers(base)
         coat = layers.pop(0).coat
         for phrase in over:
             layers += self._over(phrase, coat)
         return Recipe(coat, tuple(_once(layers)), seed)
-
-    def _known(self, phrases: list[Phrase]) -> list[Phrase]:
-        """The phrases without words that mean no material, such as names of things that no table has."""
-        for phrase in phrases:
-            phrase.unknown = [word for word in phrase.unknown if self._means_material(word)]
-        kept = [phrase for phrase in phrases if not phrase.empty]
-        return kept or [Phrase()]
 
     def _base_layers(self, base: Phrase) -> list[Layer]:
         """The base's coat, as a layer, and what lies on it of itself: its weather, an animal's marks, a thing's own parts."""
@@ -98,7 +93,8 @@ class Reading:
             ground, marks, region = ANIMALS[base.animal]
             if not base.colors:
                 layers = [Layer(replace(coat, color=_triple(rgb(ground))))]
-            layers.append(Layer(replace(coat, color=_triple(rgb(marks)), said=f"{base.animal} marks"), (region.mask(base.animal),)))
+            marked = replace(coat, color=_triple(rgb(marks)), said=f"{base.animal} marks")
+            layers.append(Layer(marked, (region.mask(base.animal),)))
         return [*layers, *self._weather(base)]
 
     def _over(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
@@ -107,16 +103,19 @@ class Reading:
             return self._more(phrase, beneath)
         coat = self._coat(phrase, beneath)
         peels = [word for word in phrase.weather if word in PEELS]
-        if phrase.region is None and (phrase.join.kind == "peel" or (peels and phrase.join.kind in ("with", "over", "and", "comma", "on"))):
+        if phrase.region is None and (phrase.join.kind == "peel" or (peels and phrase.join.kind in BESIDE)):
             rest = replace(phrase, weather=[word for word in phrase.weather if word not in PEELS])
             return [Layer(coat, (PEELED,), 2e-4), *self._weather(rest, (PEELED,), beneath)]
-        if phrase.region is None and phrase.join.kind in ("on", "over") and _coats(phrase):
+        if phrase.region is None and phrase.join.kind in ("on", "over") and phrase.coats:
             return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (), beneath)]
         if phrase.animal:
             _, marks, region = ANIMALS[phrase.animal]
             marked = replace(beneath, color=_color(phrase) if phrase.colors else _triple(rgb(marks)), said=_said(phrase))
             return [Layer(marked, (region.mask(phrase.animal),))]
         mask = self._region(phrase).mask(phrase.where)
+        if phrase.join.kind == "fade":
+            downwards = bool(phrase.region) and mask.kind == "below"
+            mask = replace(FADE.mask(phrase.where), invert=downwards)
         return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,), beneath)]
 
     def _more(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
@@ -125,7 +124,8 @@ class Reading:
         layers = []
         if phrase.finish:
             metal = (beneath.metallic or 0.0) > 0.5
-            layers = [Layer(replace(beneath, roughness=_roughness(phrase, metal) or beneath.roughness, said=_said(phrase)), (where,))]
+            rough = _roughness(phrase, metal) or beneath.roughness
+            layers = [Layer(replace(beneath, roughness=rough, said=_said(phrase)), (where,))]
         for word in _weathers(phrase):
             weather = WEATHER[word]
             coat = self._named(weather.stuff) if weather.stuff else _worn(beneath)
@@ -135,7 +135,7 @@ class Reading:
     def _region(self, phrase: Phrase) -> Region:
         """Where a phrase lies."""
         gathers = GATHERS.get(ONCE.get(phrase.substance, phrase.substance))
-        if phrase.region and gathers and phrase.region.kind == "above" and phrase.where.endswith("top"):
+        if gathers and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", 0.45, gathers.size, gathers.wear)
         if phrase.region:
             return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region
@@ -151,8 +151,8 @@ class Reading:
         made = OBJECTS[phrase.thing].made if phrase.thing else ""
         if phrase.substance:
             usual = split(made)[0] if made else Phrase()
-            same = usual.substance == phrase.substance or (phrase.substance in GENERIC and usual.substance and _family(usual) == _family(phrase))
-            if not phrase.colors and same:  # "a plastic traffic cone"
+            kin = phrase.substance in GENERIC and bool(usual.substance) and _family(usual) == _family(phrase)
+            if not phrase.colors and (kin or usual.substance == phrase.substance):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
             return self._of(stuff(phrase.substance, bool(phrase.colors)), phrase)
         if made:
@@ -164,8 +164,8 @@ class Reading:
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
         if beneath is not None and phrase.colors:  # of the same stuff
             kind = phrase.region.kind if phrase.region else JOINED.get(phrase.join.kind, JOINED["with"]).kind
-            painted = _family_of(beneath.look) in ("metal", "rust", "wood", "stone") and kind not in ("veins", "spots", "patches")
-            look = "paint" if painted or beneath.metallic else beneath.look
+            raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone")
+            look = "paint" if beneath.metallic or (raw and kind not in ("veins", "spots", "patches")) else beneath.look
             metallic = 0.0 if look == "paint" else beneath.metallic
             rough = _roughness(phrase, bool(metallic)) or (0.35 if look == "paint" else beneath.roughness)
             look = look_of(stuff("paint", True), available=self._looks) if look == "paint" else look
@@ -201,8 +201,8 @@ class Reading:
         words = " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance]).strip()
         *color, roughness, metallic = self._prior.read([words]).coats[0, 0].tolist()
         near = stuff(self._nearest(phrase, metallic > 0.5), False)
-        read = near._replace(look=own or near.look, color=_triple(np.array(color)), roughness=roughness, metallic=float(metallic > 0.5))
-        return self._of(read._replace(paintable=True), phrase)
+        means = {"color": _triple(np.array(color)), "roughness": roughness, "metallic": float(metallic > 0.5)}
+        return self._of(near._replace(look=own or near.look, paintable=True, **means), phrase)
 
     def _kind_of(self, word: str) -> str:
         """The substance that a dictionary names a word by, where that is all it says of it; or ""."""
@@ -230,12 +230,14 @@ class Reading:
     def _meaning(self, text: str) -> np.ndarray:
         """(D,) mean direction of the words of a text; zero for what resembles nothing."""
         vocabulary = self._prior.vocabulary
-        total = np.sum([vocabulary.vector(word) for word in vocabulary.read(text)] or [np.zeros(vocabulary.vectors.shape[1])], 0)
+        total = np.zeros(vocabulary.vectors.shape[1], np.float32)
+        for word in vocabulary.read(text):
+            total += vocabulary.vector(word)
         length = float(np.linalg.norm(total))
         return total / length if length > 0 else total
 
     def _weather(self, phrase: Phrase, where: tuple[Mask, ...] = (), under: Coat | None = None) -> list[Layer]:
-        """What words of wear and weather lay over a phrase's coat. Args: under: what shows where it is worn, if that is known."""
+        """What words of wear and weather lay over a phrase's coat. Args: under: what shows where it is worn, if known."""
         layers = []
         for word in _weathers(phrase):
             weather = WEATHER[word]
@@ -254,7 +256,7 @@ class Reading:
         """What shows where a coat is worn through."""
         if phrase.shows:
             return self._coat(phrase.shows)
-        if under and _coats(phrase):
+        if under and phrase.coats:
             return under
         own = self._coat(phrase)
         family = KNOWN[phrase.substance][0].family if phrase.substance else ""
@@ -268,10 +270,13 @@ class Reading:
 
 def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
     """The base, and what lies over it from below: "spots on tan", "paint peeling off wood" name the upper one first."""
+    for after in phrases[1:]:
+        if after.join.kind == "below" and (after.coats or after.substance in GATHERS):
+            after.join = Join("over")  # "iron under peeling paint"
     base = 0
     while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
         base += 1
-    upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in zip(phrases, phrases[1 : base + 1], strict=False)]
+    upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
     return _placed(phrases[base], [*reversed(upper), *phrases[base + 1 :]])
 
 
@@ -295,16 +300,12 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
         first, over = replace(over[0], thing=first.thing, join=Join(""), weather=[*first.weather, *over[0].weather]), over[1:]
     if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
         over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
-    if over and over[0].region and first.region and {over[0].region.kind, first.region.kind} == {"above", "below"} and over[0].where in ("above", "below"):
-        over[0] = replace(over[0], region=over[0].region._replace(share=1 - first.region.share))
+    region, other = (over[0].region if over else None), first.region
+    if region and other and over[0].where in ("above", "below") and {region.kind, other.kind} == {"above", "below"}:
+        over[0] = replace(over[0], region=region._replace(share=1 - other.share))
     if first.thing in TABLES:
         over = [replace(p, region=TABLE_PARTS.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
     return first, over
-
-
-def _coats(phrase: Phrase) -> bool:
-    """Whether it is a thin coat on something."""
-    return bool(phrase.substance) and (_family(phrase) == "paint" or phrase.substance in COATINGS)
 
 
 def _covers(phrase: Phrase) -> bool:
@@ -333,8 +334,8 @@ def _weathers(phrase: Phrase) -> list[str]:
     for word, weather in WEATHER.items():
         if word in phrase.weather:
             told.setdefault((weather.stuff, weather.region.kind), word)
-    if len(told) > 1 and ("grime", "crevices") in told and any(key != ("grime", "crevices") and key[1] == "crevices" for key in told):
-        del told["grime", "crevices"]  # what else lies in crevices hides it
+    if sum(place == "crevices" for _, place in told) > 1:
+        told.pop(("grime", "crevices"), None)  # what else lies in crevices hides it
     return list(told.values())
 
 
@@ -397,5 +398,6 @@ def _triple(color: np.ndarray) -> RGB:
 
 def _said(phrase: Phrase) -> str:
     """A phrase in few words."""
-    boards = ["boards"] if phrase.boards and "board" not in phrase.substance and "plank" not in phrase.substance else []
-    return " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance or phrase.animal or phrase.thing, *boards]).strip()
+    boards = ["boards"] if phrase.boards and phrase.substance not in BOARDS else []
+    name = phrase.substance or phrase.animal or phrase.thing
+    return " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, name, *boards]).strip()

@@ -11,12 +11,12 @@ UNITS = {
 }  # fmt: skip
 """Unit → metres."""
 
-MEASURE = re.compile(
-    rf"(\d+(?:\.\d+)?)[ -]?({'|'.join(sorted(UNITS, key=len, reverse=True))})\b(?:[ -](?:tall|high|wide|long|large|big|across))?"
-)
+_UNIT = "|".join(sorted(UNITS, key=len, reverse=True))
+MEASURE = re.compile(rf"(\d+(?:\.\d+)?)[ -]?({_UNIT})\b(?:[ -](?:tall|high|wide|long|large|big|across))?")
 
 TIMES = {
-    "tiny": 0.2, "miniature": 0.1, "mini": 0.3, "little": 0.6, "small": 0.6, "large": 1.6, "big": 1.6, "huge": 4.0, "giant": 8.0,
+    "tiny": 0.2, "miniature": 0.1, "mini": 0.3, "little": 0.6, "small": 0.6, "large": 1.6, "big": 1.6, "huge": 4.0,
+    "giant": 8.0,
     "enormous": 8.0, "gigantic": 10.0, "colossal": 10.0, "oversized": 2.0, "life-size": 1.0, "life size": 1.0,
 }  # fmt: skip
 """Word → factor of a thing's usual size."""

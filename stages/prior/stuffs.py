@@ -30,35 +30,48 @@ LOOK_OF = {name: look for look, names in rows("looks.tsv") for name in words(nam
 """A substance's name → the look it should have; also of names whose means the reader knows alone."""
 
 FAMILY_LOOKS = {
-    "metal": ("steel",), "rust": ("rust",), "wood": ("oak",), "stone": ("rock", "granite"), "ceramic": ("porcelain", "glossy plastic"),
-    "plastic": ("plastic",), "paint": ("paint",), "fabric": ("linen", "denim"), "leather": ("leather", "rubber"),
+    "metal": ("steel",), "rust": ("rust",), "wood": ("oak",), "stone": ("rock", "granite"),
+    "ceramic": ("porcelain", "glossy plastic"),
+    "plastic": ("plastic",), "paint": ("paint",), "fabric": ("fabric", "linen"), "leather": ("leather", "rubber"),
     "organic": ("skin", "wax"), "paper": ("paper", "foam"), "gem": ("glass",), "ice": ("snow", "foam"),
 }  # fmt: skip
 """Family → looks that stand in for one that is missing, the best first."""
 
-GENERIC = frozenset(
-    ["wood", "wooden", "timber", "fabric", "cloth", "textile", "metal", "metallic", "stone", "rock", "ceramic", "pottery", "plastic", "paint", "painted", "leather", "paper"]
-)
+GENERIC = frozenset(words(
+    "wood, wooden, timber, fabric, cloth, textile, metal, metallic, stone, rock, ceramic, pottery, plastic, paint, painted, "
+    "leather, paper"
+))  # fmt: skip
 """Names of whole families: another name before one of them says which ("teak wood")."""
 
-BOARDS = frozenset(words("boards, planks, floorboards, wooden boards, wooden planks, wood planks, wood boards, decking, planking, parquet, wooden floor, wood floor"))
+BOARDS = frozenset(words(
+    "boards, planks, floorboards, wooden boards, wooden planks, wood planks, wood boards, decking, planking, parquet, "
+    "wooden floor, wood floor"
+))  # fmt: skip
 """Words for sawn boards, which any wood may lie in."""
 
-PATTERNED = frozenset(words("brick, bricks, tile, tiles, roof tiles, shingles, setts, paving, mosaic, stone blocks, stone bricks, concrete blocks"))
+PATTERNED = frozenset(words(
+    "brick, bricks, tile, tiles, roof tiles, shingles, setts, paving, mosaic, stone blocks, stone bricks, concrete blocks"
+))  # fmt: skip
 """Names of what is laid of pieces: a name before one of them is what the pieces are made of."""
 
-ROOFS = dict.fromkeys(("terracotta", "clay", "tile", "tiles", "tiled", "earthenware"), "roof tiles")
+ROOFS = {
+    **dict.fromkeys(("terracotta", "clay", "tile", "tiles", "tiled", "earthenware"), "roof tiles"), "tin": "galvanized steel",
+}  # fmt: skip
 """What a roof is laid of, where words name its stuff."""
+
+COATINGS = frozenset(words("plaster, stucco, enamel, gold leaf, gold foil, varnish, glaze, lacquer, black lacquer, gilding"))
+"""Thin coats that are no paint."""
 
 FINISH_LOOKS = {
     "beaten": "hammered", "forged": "hammered", "dented": "hammered", "burnished": "polished", "mirror": "polished",
-    "mirror-like": "polished", "mirror polished": "polished", "gleaming": "polished", "milled": "machined", "turned": "machined",
+    "mirror-like": "polished", "mirror polished": "polished", "gleaming": "polished", "milled": "machined",
+    "turned": "machined",
     "cast": "cast", "hammered": "hammered", "brushed": "brushed", "polished": "polished", "machined": "machined",
 }  # fmt: skip
 """Words of finish → the finish whose look of a metal they call for."""
 
 
-PAINTABLE = frozenset(words("ceramic, plastic, paint, fabric, leather, paper, fruit peel, wax, skin, fur, feathers, scales"))
+PAINTABLE = frozenset(words("ceramic, plastic, paint, fabric, leather, paper, tomato skin, wax, skin, fur, feathers, scales"))
 """Families and looks that take any colour. Of others a colour that is like their own only describes them: "green moss"."""
 
 
@@ -73,7 +86,8 @@ def _extra() -> dict[str, list[Stuff]]:
     for family, look, color, roughness, names in rows("stuffs.tsv"):
         red, green, blue = rgb(color).tolist()
         for name in words(names):
-            table[name] = [Stuff(name, family, look, (red, green, blue), float(roughness), float(family == "metal"), family in PAINTABLE or look in PAINTABLE)]
+            paintable = family in PAINTABLE or look in PAINTABLE
+            table[name] = [Stuff(name, family, look, (red, green, blue), float(roughness), float(family == "metal"), paintable)]
     return table
 
 

@@ -14,13 +14,12 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from numpy.random import Generator
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from stages.core.artifact import Field, Schema, load_npz
 from stages.prior.patterns import PATTERNS
-from stages.prior.recipe import LAYOUTS, Recipe, draw_coat, draw_layout
+from stages.prior.recipe import LAYOUTS
 
 VOCABULARY = Schema(
     "dreammat.vocabulary",
@@ -197,14 +196,6 @@ class Reading:
     spread: Tensor
     pattern: Tensor
     layout: Tensor
-
-    def recipe(self, index: int, rng: Generator) -> Recipe:
-        """What prompt number `index` most likely calls for; what the words leave open is drawn."""
-        kinds = [list(PATTERNS)[k] for k in self.pattern[index].argmax(1).tolist()]
-        means, spreads = self.coats[index].cpu().numpy(), self.spread[index].cpu().numpy()
-        coats = tuple(draw_coat(rng, *given) for given in zip(means, spreads, kinds, strict=True))
-        layout = LAYOUTS[int(self.layout[index].argmax())]
-        return Recipe(coats[:1]) if layout == "none" else Recipe(coats, draw_layout(rng, layout))
 
 
 class Reader(TextEncoder):

@@ -250,8 +250,10 @@ def test_bytes_do_not_depend_on_the_number_of_threads(
     for threads in (1, 2, 3):
         monkeypatch.setattr(parallel, "cores", lambda threads=threads: threads)
         torch.set_num_threads(threads)
-        out = tmp_path / f"{threads}.npz"
-        distill(folder / "conditions", out, options(folder, guidance=guidance, prompt="oak", steps=5, smoothness=0.1))
+        out, told = tmp_path / f"{threads}.npz", list[str]()
+        chosen = options(folder, guidance=guidance, prompt="oak with a gold base", steps=5, smoothness=0.1)
+        distill(folder / "conditions", out, chosen, tell=told.append)
+        assert told == (["oak: everywhere", "gold: lowest 50 % (base)"] if guidance == "prior" else [])
         assert torch.get_num_threads() == threads
         written.append(out.read_bytes())
     torch.set_num_threads(by_torch)

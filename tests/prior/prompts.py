@@ -17,7 +17,7 @@ blue paint peeling off wood | all wood #92633b | chips paint #1f45b8
 copper roof, brick walls | all stone #94503c | above metal #fad1c2
 half oak half gold | all wood #b48a56 | left/right/above/below metal #ffe29b
 concrete fading into grass | all stone #98968f | fade organic #4a6a28
-a teapot of white porcelain with a gold rim and a wooden handle | all ceramic #f0eee8 | above metal #ffe29b | */below/thin wood #92633b
+a teapot of white porcelain with a gold rim and wooden handle | all ceramic #f0eee8 | above metal #ffe29b | below wood #92633b
 red velvet armchair with dark wooden legs | all fabric #c01818 | below wood #4a3020
 green glass bottle with a cork top | all plastic #1f8a2c | above wood #b98a5a
 rusty iron gate with peeling white paint | all rust #7a3b1d | chips paint #eeeeee

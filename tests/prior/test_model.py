@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from numpy.random import default_rng
 
 from stages.core.artifact import Provenance, sha256_file
 from stages.core.errors import ArtifactError
@@ -89,27 +88,6 @@ def test_words_are_read_as_what_they_name(prior: Prior) -> None:
     assert min(gold[4], steel[4], chrome[4]) > 0.7 and max(red[4], rubber[4]) < 0.3
     assert gold[2] < gold[0] - 0.15 and red[0] > red[1] + 0.3
     assert rubber[:3].max() < 0.3 and chrome[3] < 0.25 < rubber[3]
-
-
-@pytest.mark.parametrize(
-    "prompt, pattern",
-    [("oak", "grain"), ("mahogany", "grain"), ("white marble", "veins"), ("brick", "bricks"), ("granite", "speckle"),
-     ("brushed steel", "streaks"), ("red plastic", "plain"), ("brown leather", "cells"), ("linen", "weave")],
-)
-def test_words_are_read_as_their_pattern(prior: Prior, prompt: str, pattern: str) -> None:
-    (coat,) = prior.read([prompt]).recipe(0, default_rng(0)).coats
-    assert coat.pattern == pattern
-
-
-@pytest.mark.parametrize(
-    "prompt, kind",
-    [("oak", None), ("marble base and copper top", "top"), ("red plastic with gold trim", "edges"),
-     ("white ceramic with blue spots", "spots"), ("black rubber with yellow stripes", "stripes"),
-     ("stone with moss in the crevices", "crevices"), ("steel with patches of rust", "patches")],
-)
-def test_words_are_read_as_their_layout(prior: Prior, prompt: str, kind: str | None) -> None:
-    layout = prior.read([prompt]).recipe(0, default_rng(0)).layout
-    assert (layout.kind if layout else None) == kind
 
 
 def test_samples_are_finite_and_follow_their_seed(prior: Prior) -> None:

@@ -1,14 +1,11 @@
 import numpy as np
 import pytest
 import torch
-from numpy.random import default_rng
 
 from stages.prior.colors import COLORS
 from stages.prior.model import VOCABULARY_FILE
 from stages.prior.names import OBJECTS, SUBSTANCES
-from stages.prior.patterns import PATTERNS
-from stages.prior.recipe import LAYOUTS
-from stages.prior.text import MAX_WORDS, Reading, TextEmbedding, TextEncoder, Vocabulary, split_words
+from stages.prior.text import MAX_WORDS, TextEmbedding, TextEncoder, Vocabulary, split_words
 from stages.train.captions import template_words
 
 
@@ -104,23 +101,3 @@ def test_embeddings_expand_and_join() -> None:
     joined = TextEmbedding.cat([one.expand(2), one])
     assert joined.tokens.shape == (3, 5, 8) and joined.pooled.shape == (3, 8)
     assert torch.equal(joined.tokens[0], joined.tokens[2])
-
-
-def reading(layout: str) -> Reading:
-    """Grey stone, and gold on it."""
-    coats = torch.tensor([[[0.5, 0.5, 0.5, 0.7, 0.0], [0.9, 0.8, 0.5, 0.2, 1.0]]])
-    names = list(PATTERNS)
-    pattern = 40 * torch.eye(len(names))[[names.index("blotch"), names.index("smudge")]][None]
-    return Reading(coats, torch.full((1, 2, 2), 0.1), pattern, 40 * torch.eye(len(LAYOUTS))[[LAYOUTS.index(layout)]])
-
-
-def test_a_reading_is_a_recipe_of_the_most_likely() -> None:
-    recipe = reading("spots").recipe(0, default_rng(0))
-    assert [coat.pattern for coat in recipe.coats] == ["blotch", "smudge"] and recipe.layout.kind == "spots"
-    assert [coat.metallic for coat in recipe.coats] == [0.0, 1.0]
-    assert reading("none").recipe(0, default_rng(0)).layout is None
-
-
-def test_a_seed_draws_what_the_words_leave_open() -> None:
-    first, again, other = (reading("none").recipe(0, default_rng(s)).coats[0] for s in (1, 1, 2))
-    assert first.scale == again.scale != other.scale

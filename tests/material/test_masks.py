@@ -1,0 +1,52 @@
+"""Where layers lie: veins, fades and sides. The plate is a square of edge 1 that stands upright, seen from its front."""
+
+import numpy as np
+import pytest
+
+from stages.material.masks import coverage, settled
+from stages.material.place import Place
+from stages.material.recipe import Coat, Layer, Mask, Recipe
+from stages.material.surface import Surface
+
+
+def plate(size: int, extent: float = 1.0) -> Surface:
+    """(size²) points, row by row from the top."""
+    across = (np.arange(size) + 0.5) / size * extent
+    y, z = (a.ravel() for a in np.meshgrid(across, across[::-1]))
+    point = np.stack([0 * y, y, z], 1).astype(np.float32)
+    return Surface.bare(point, np.broadcast_to(np.array([1, 0, 0], np.float32), point.shape), extent / size)
+
+
+def covered(mask: Mask, size: int, extent: float = 1.0) -> np.ndarray:
+    """How much of each point a mask covers that was settled on the whole plate: (size, size)."""
+    layer = settled(Recipe(Coat("even"), (Layer(Coat("even"), (mask,)),), 3), plate(128)).layers[0]
+    surface = plate(size, extent)
+    flat = np.ascontiguousarray(surface.point.T[1:])
+    place = Place(np.ascontiguousarray(surface.point.T), flat, np.zeros(len(surface), np.int32), surface.footprint, seed=3)
+    return coverage(layer.masks, surface, place.seeded(1)).reshape(size, size)
+
+
+def test_veins_cover_their_share_thinly_and_crisply() -> None:
+    veins = Mask("veins", 0.06, 0.22, 0.0)
+    whole = covered(veins, 256)
+    assert abs(whole.mean() - 0.06) < 0.02
+    coarse, fine = (((near > 0.05) & (near < 0.95)).mean() for near in (covered(veins, size, 0.25) for size in (128, 512)))
+    assert 0 < fine < 0.4 * coarse  # borders a texel wide: a quarter of the area where texels are a quarter as long
+    inside = whole > 0.5
+    eroded = inside[4:-4, 4:-4] & inside[8:, 4:-4] & inside[:-8, 4:-4] & inside[4:-4, 8:] & inside[4:-4, :-8]
+    assert eroded.sum() < 0.25 * inside.sum()
+
+
+def test_a_fade_rises_from_nothing_to_all() -> None:
+    rows = covered(Mask("fade", 0.5, 0.6, 0.0), 64).mean(1)
+    assert rows[:6].min() > 0.95 and rows[-6:].max() < 0.05 and abs(rows.mean() - 0.5) < 0.08
+    assert np.all(np.diff(rows[::8]) <= 0.02)
+
+
+@pytest.mark.parametrize(
+    ("kind", "side"),
+    [("left", np.s_[:, 40:]), ("right", np.s_[:, :24]), ("above", np.s_[:24]), ("below", np.s_[40:])],
+)
+def test_halves_are_where_words_say(kind: str, side: tuple[slice, ...]) -> None:
+    cover = covered(Mask(kind, 0.5, 0.05, 0.0), 64)
+    assert cover[side].min() == 1 and abs(cover.mean() - 0.5) < 0.02
