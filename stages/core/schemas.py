@@ -98,7 +98,8 @@ MATERIAL = Schema(
 )
 
 ASSET = Schema("dreammat.asset", 2, manifest="bake.json")
-"""A folder: albedo, roughness, metallic and occlusion .exr; albedo.png, orm.png; model.glb; preview.png; report.html; bake.json.
+"""A folder: albedo, roughness, metallic and occlusion .exr; albedo.png, orm.png; model.glb; preview.png;
+report.html; bake.json.
 
 Where the material has them: normal .exr and .png, height.exr.
 """
