@@ -85,7 +85,8 @@ def _radius(away: NDArray, normal: NDArray, weight: NDArray) -> float:
     outward = abs((away[:, :2] * normal[:, :2]).sum(1)) / np.maximum(radius * level, 1e-9)
     azimuth = np.exp(1j * np.arctan2(away[:, 1], away[:, 0]))
     all_around = abs((weight * azimuth).sum()) / weight.sum() < 0.35
-    return float((radius * weight).sum() / weight.sum()) if all_around and (outward * weight).sum() / weight.sum() > ROUND else 0.0
+    is_round = all_around and (outward * weight).sum() / weight.sum() > ROUND
+    return float((radius * weight).sum() / weight.sum()) if is_round else 0.0
 
 
 def along(pieces: Pieces, piece: NDArray[np.int32], point: Array, normal: Array) -> tuple[Array, NDArray[np.int32]]:

@@ -122,7 +122,8 @@ def turned(found: Look, coat: Coat) -> Look:
     if coat.color is not None or coat.contrast != 1:
         color = color + (recolored(color, mean.lab, coat) - color) * found.dye
     if coat.roughness is not None:
-        spread = min(1.0, coat.roughness / max(mean.roughness, 1e-3), (1 - coat.roughness) / max(1 - mean.roughness, 1e-3) + 0.3)
+        room = (1 - coat.roughness) / max(1 - mean.roughness, 1e-3) + 0.3
+        spread = min(1.0, coat.roughness / max(mean.roughness, 1e-3), room)
         roughness = coat.roughness + (roughness - mean.roughness) * np.float32(spread)
     if coat.metallic is not None:
         metallic = metallic + np.float32(coat.metallic - mean.metallic)

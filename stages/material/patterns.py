@@ -116,7 +116,8 @@ def threshold(x: Array, level: Array | float, softness: Array | float) -> Array:
 def exceeds(x: Array, level: float, softness: float, hidden: Array) -> Array:
     """Share of noise above a level, of which a part of deviation `hidden` cannot be seen. softness: of the border. Returns:
     (P,)."""
-    steepness = np.float32(1.702) / np.hypot(np.float32(max(0.6 * softness, 1e-3)), hidden)  # the logistic curve next to the normal one
+    deviation = np.hypot(np.float32(max(0.6 * softness, 1e-3)), hidden)
+    steepness = np.float32(1.702) / deviation  # the logistic curve that is nearest to the normal one
     return (1 / (1 + np.exp(np.clip((level - x) * steepness, -40, 40)))).astype(np.float32)
 
 

@@ -92,7 +92,8 @@ def test_seeds_change_patterns_not_stuff() -> None:
 
 def test_the_same_view_at_two_texel_sizes_is_the_same_on_average() -> None:
     """4 x 4 fine texels against one coarse one: the band limit hides nothing but what is too fine."""
-    recipe = settled(Recipe(Coat("brick", metres=2.0), (Layer(Coat("moss", metres=1.0), (Mask("patches", 0.3),), 1e-3),)), plate(64))
+    moss = Layer(Coat("moss", metres=1.0), (Mask("patches", 0.3),), 1e-3)
+    recipe = settled(Recipe(Coat("brick", metres=2.0), (moss,)), plate(64))
     fine = evaluate(recipe, plate(512, 0.5))[:, :5].reshape(128, 4, 128, 4, 5).mean((1, 3))
     coarse = evaluate(recipe, plate(128, 0.5))[:, :5].reshape(128, 128, 5)
     assert np.sqrt(np.square(fine - coarse).mean()) < 0.05

@@ -161,8 +161,8 @@ def carbon_fibre(at: Place) -> Look:
 
 
 LOOKS = {
-    "glossy plastic": glossy_plastic, "plastic": plastic, "rubber": rubber, "foam": foam, "paint": paint, "car paint": car_paint,
-    "painted wood": painted_wood, "glass": glass, "wax": wax, "carbon fibre": carbon_fibre,
+    "glossy plastic": glossy_plastic, "plastic": plastic, "rubber": rubber, "foam": foam, "paint": paint,
+    "car paint": car_paint, "painted wood": painted_wood, "glass": glass, "wax": wax, "carbon fibre": carbon_fibre,
 }  # fmt: skip
-METRES = {"glossy plastic": 0.2, "plastic": 0.2, "rubber": 0.25, "foam": 0.35, "paint": 0.4, "car paint": 0.35, "painted wood": 0.4,
-          "glass": 0.3, "wax": 0.2, "carbon fibre": 0.2}  # fmt: skip
+METRES = {"glossy plastic": 0.2, "plastic": 0.2, "rubber": 0.25, "foam": 0.35, "paint": 0.4, "car paint": 0.35,
+          "painted wood": 0.4, "glass": 0.3, "wax": 0.2, "carbon fibre": 0.2}  # fmt: skip

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from stages.material.look import Look, Substance, each, mix, palette, shade, tint
+from stages.material.look import Look, Substance, averaged, each, mix, palette, shade, tint
 from stages.material.patterns import (
     Array,
     Spectrum,
