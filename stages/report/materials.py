@@ -34,7 +34,10 @@ RAKING = np.array([0.75, 0.5, 0.43])
 
 @dataclass(frozen=True)
 class Row:
-    """One substance. seconds: of its swatch. nearest: of the references, and how far away; of its own kind, where there is one."""
+    """One substance. seconds: of its swatch. nearest: of the references, and how far away.
+
+    own: how far away the nearest of its own kind is.
+    """
 
     name: str
     seconds: float
