@@ -103,7 +103,7 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
     if token.kind == "comma":
         return None if now.empty else Join("comma")
     if token.kind == "postfix":
-        if now.color_only and now.join.kind in ("and", "comma") and token.text in SHAPES:
+        if (now.color_only or now.substance) and now.join.kind == "and" and token.text in SHAPES:
             now.region, now.where = SHAPES[token.text], token.text  # "red and white striped canvas"
             return None
         if not now.says_what and token.text in SHAPES:
@@ -197,6 +197,8 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             whole.finish += phrase.finish
             _add(whole.weather, phrase.weather)
         elif before and _wears(before, phrase):
+            if phrase.coats and not before.coats:  # "a white fence with flaking paint"
+                before.shows = Phrase(substance=before.substance, thing=before.thing)
             _add(before.weather, phrase.weather or [WEARS[phrase.where]])
         elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
             _describe(before, phrase)
@@ -217,7 +219,7 @@ def _wears(before: Phrase, phrase: Phrase) -> bool:
     """Whether a phrase says how the one before is worn: "with scratches"; "painted wood, the paint worn at the edges"."""
     if phrase.where in WEARS and not phrase.says_what:
         return True
-    again = phrase.coats and before.coats and not phrase.colors and not before.region
+    again = phrase.coats and not phrase.colors and not before.region and (before.coats or bool(before.colors))
     return again and any(word in SHOWS for word in phrase.weather)
 
 
@@ -272,6 +274,8 @@ def _in_pairs(phrases: list[Phrase]) -> list[Phrase]:
     """Colours side by side share what follows: "red and white striped canvas", "white with red and blue stripes"."""
     for number in range(len(phrases) - 2, -1, -1):
         first, second = phrases[number], phrases[number + 1]
+        if first.join.kind == second.join.kind == "half":
+            first.region, first.where = Region("left", 0.5), "half"
         if not first.color_only or first.region or second.join.kind not in ("and", "comma", "fade", "half"):
             continue
         first.thing = first.thing or ("" if second.where in PARTS else second.thing)

@@ -283,7 +283,8 @@ def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
 def _stands(first: Phrase, second: Phrase) -> bool:
     """Whether a thing stands on its own part, "a dragon on a wooden base", rather than a stuff on what is beneath."""
     part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
-    return part and not first.region and first.substance not in GATHERS
+    thing = bool(first.thing and first.substance) and second.join.kind == "on" and not second.thing
+    return (part or thing) and not first.region and first.substance not in GATHERS
 
 
 def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:

@@ -72,6 +72,20 @@ emerald velvet cushion with gold tassels | all fabric #01a049 | */edges metal #f
 helmet in polished steel with gilded edges | all metal #c6c6c4 | edges metal #ffe29b
 zebra striped fabric | all fabric #ece8e0 | stripes fabric #161514
 grey stone below, white snow above | all stone #808080 | above ice #eeeeee
+old bronze cannon on a wooden carriage | all metal #c89969 | patches/below wood #92633b
+carved jade dragon on a wooden stand | all gem #4a8a5e | below wood #92633b
+polished steel blade, leather-wrapped grip, brass pommel | all metal #c6c6c4 | below leather #5e3a22 | below metal #f4e2ae
+concrete with a band of blue tiles | all stone #98968f | bands ceramic #1f45b8
+green paint over wood, peeling | all wood #92633b | chips paint #1f8a2c
+rusty iron under peeling green paint | all rust #7a3b1d | chips paint #1f8a2c
+turquoise and gold striped vase | all ceramic #30c0b8 | stripes metal #ffe29b
+paint: teal; trim: copper | all paint #107878 | edges metal #fad1c2
+split in half: one side gold, the other side silver | all metal #ffe29b | right metal #fcfaf5
+white with red and blue stripes | all * #eeeeee | stripes * #c01818 | stripes * #1f45b8
+wooden table with a marble top | all wood #92633b | above stone #e8e4de
+gold plated steel with scratches revealing the steel | all metal #ffe29b | scratches metal #c6c6c4
+sandstone that turns into marble | all stone #c8a878 | fade stone #e8e4de
+grey concrete, lower third painted yellow | all stone #98968f | below paint #e8cc18
 """
 
 WORDS = """
