@@ -54,6 +54,7 @@ def test_a_hexagon_is_as_wide_as_asked_and_all_its_points_are_nearest_to_its_own
     away = np.hypot(found.x, found.y)
     assert found.border.min() > -1e-6 and found.border.max() == pytest.approx(0.003, abs=5e-5)
     assert away.max() == pytest.approx(0.006 / 3**0.5, rel=0.01)  # a corner
+    assert (found.border <= 0.003 - away * 3**0.5 / 2 + 1e-6).all()  # no wall lies farther than towards a corner
 
 
 def test_legs_of_a_stitch_mirror_each_other():
