@@ -52,7 +52,8 @@ def layered(recipe: Recipe, surface: Surface, world: Place, pieces: Pieces = WHO
         some = np.flatnonzero(cover > 0)
         if len(some):
             over = coated(layer.coat, surface[some], world[some], pieces, number)
-            over[:, 5] += 0.5 * values[some, 5] + layer.thickness / layer.coat.metres
+            relief = layer.strength**2 * over[:, 5]  # what lies thinly stands out little
+            over[:, 5] = relief + 0.5 * values[some, 5] + layer.thickness / layer.coat.metres
             values[some] += (over - values[some]) * cover[some, None]
     return values
 
