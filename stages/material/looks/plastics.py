@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stages.material.look import Look, palette, shade, tint
+from stages.material.look import Look, mix, palette, shade, tint
 from stages.material.patterns import (
     Array,
     Spectrum,
@@ -149,13 +149,19 @@ def wax(at: Place) -> Look:
     return Look(color, np.clip(rough, 0.1, 1), 0.0, 6e-5 * mottle + 1e-5 * fine - 2e-5 * scuffs)
 
 
+CARBON = ("#0d0d0e", "#1b1b1d", "#333437")
+
+
 def carbon_fibre(at: Place) -> Look:
     """Twill of flat black tows under clear resin: each crossing catches the light its own way."""
     cloth = weave(at, 0.002, "twill", 0.99, 1)
     strand = fbm(at.flat, Spectrum(0.0006, 0.0001, 1.0, tails=0.3), 2)
-    sheen = np.where(cloth.warp > 0.5, 0.55, -0.45) * cloth.seen
+    sheen = np.where(cloth.warp > 0.5, 0.55, -0.45)
     scuffs, worn = _handled(at, 0.5)
-    color = palette(0.5 + 0.6 * sheen * (1 - 0.4 * abs(cloth.across)) + 0.1 * strand, "#0d0d0e", "#1b1b1d", "#333437")
+    lit = 0.5 + 0.6 * sheen * (1 - 0.4 * np.clip(abs(cloth.across), 0, 1)) + 0.1 * strand
+    even = np.array([0.76, 0.76, 0.28], np.float32)[:, None] + 0.1 * strand  # two tows of the draft's three lie up
+    color = mix(sum(palette(t, *CARBON) for t in even) / 3, palette(lit, *CARBON), cloth.seen)
+    sheen = sheen * cloth.seen
     rough = 0.2 + 0.03 * np.clip(worn, -1, 3) - 0.05 * sheen + 0.2 * scuffs + 0.02 * strand
     return Look(shade(color, 0.1 * strand + 0.2 * scuffs), np.clip(rough, 0.03, 1), 0.0, 2e-5 * cloth.height * cloth.seen)
 
