@@ -111,6 +111,13 @@ class Sums:
     variance: NDArray[np.float32]
     rays: NDArray[np.float32]
 
+    def of_lights(self, count: int) -> "Sums":
+        """Without the channels that no light uses: averaging takes as long as there are channels."""
+        if count == MAX_LIGHTS:
+            return self
+        mean, noise = (np.ascontiguousarray(values[:, :, : 3 * count]) for values in (self.mean, self.variance))
+        return Sums(mean, noise, self.rays)
+
 
 def light_transport(
     scene: Scene, points: GBuffer, environments: list[Environment], quality: Quality, seed: int
@@ -146,7 +153,7 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
     """`light_transport` for lights that are already split."""
     near = reconstruction.Neighbours.of(points)
-    sums = gather(scene, points, lights, quality, seed, near)
+    sums = gather(scene, points, lights, quality, seed, near).of_lights(len(lights.environments))
     mean = smoothed(sums, points, lights, near) if quality.smooth else sums.mean
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
     return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
@@ -185,7 +192,7 @@ def smoothed(
     if not terms.highlights:
         return reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
     places = terms.places_of_highlights()
-    shown = highlights.open_highlights(points, lights.lamps, terms.alphas[list(terms.highlights)])
+    shown = highlights.open_highlights(points, lights.lamps, terms.alphas[list(terms.highlights)], sums.mean.shape[2])
     kept = highlights.take_out(sums.mean, sums.variance, shown, places, near)
     result = reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
     highlights.put_back(result, sums.mean, kept, places)
