@@ -38,7 +38,7 @@ class NormalMap:
         """
         vector = Texture(self.vectors, self.matrix, self.wrap).at(uv, across)
         length = np.linalg.norm(vector, axis=1, keepdims=True)
-        scaled = vector * np.float32([self.scale, self.scale, 1])
+        scaled = vector * np.array([self.scale, self.scale, 1], np.float32)
         stretch = np.linalg.norm(scaled, axis=1, keepdims=True)
         kept = np.where(across is None, 1, length.clip(0, 1)) / np.where(stretch > 0, stretch, 1)
         return np.where(stretch > 0, scaled * kept, (0.0, 0.0, 1.0)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""An asset's model.glb in Cycles and in three.js beside preview.png: the same light, cameras and exposure, PSNR over the object.
+"""An asset in Cycles and in three.js beside preview.png: the same light, cameras and exposure, PSNR over the object.
 
 What is rendered is what others would open: model.glb with its own textures, normals and tangents, and preview_light.exr
 as the world; preview.json has the cameras. Blender has a Python of its own, in which this file is run as a script.
