@@ -74,7 +74,7 @@ def test_light_has_no_dots(monkeypatch: pytest.MonkeyPatch) -> None:
     shown = srgb_encode(draw_view(look, preview_light(), view, size).over(np.zeros(3, "f4")))
     monkeypatch.setattr(preview, "RAYS", Quality(lobe=700, light=250, extra=False))
     exact = srgb_encode(draw_view(look, preview_light(), view, size).over(np.zeros(3, "f4")))
-    assert np.sqrt(np.square(shown - exact).mean()) < 0.8 / 255
+    assert np.sqrt(np.square(shown - exact).mean()) < 1.2 / 255
     assert np.abs(shown - exact).max() < 8 / 255
 
 
@@ -93,7 +93,7 @@ def test_bumps_too_fine_to_see_make_the_surface_rougher() -> None:
     assert length[0] == pytest.approx(np.sqrt(1 - 0.09), abs=0.01)
     assert rougher(np.float32([0.2, 0.2]), np.float32([0, 0.05])) == pytest.approx([0.2, 0.1016**0.25], rel=1e-4)
     look = Look(scene.bumped(bumps), uv, np.full((2, 2, 5), 0.5, "f4"))
-    flat, bumpy = (draw_view(one, preview_light(), camera(scene.vertices.astype(float), 20, 60), 16).color
+    flat, bumpy = (draw_view(one, preview_light(), camera(scene.vertices.astype(float), 125, 28), 16).color
                    for one in (replace(look, scene=scene), look))  # fmt: skip
     assert bumpy.max() < 0.9 * flat.max()  # the mirrored sun is spread out
 
