@@ -133,6 +133,7 @@ bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light 
 	$(MAKE) demo/prep.npz
 	$(DREAMMAT) report conditions demo/prep.npz -o bench $$(cat $(MITSUBA) $(CYCLES))
 	@echo "look at bench/conditions.png"
+	[ ! -s $(CYCLES) ] || { $(MAKE) demo && $(DREAMMAT) report preview demo/asset -o bench $$(cat $(CYCLES)); }
 
 # other renderers, each in a virtual environment of its own; an empty file where it cannot be had or does not run
 $(MITSUBA): | $(VENV)/.ready

@@ -10,6 +10,7 @@ from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, r
 from stages.report.options import (
     DistillReportOptions,
     OcclusionReportOptions,
+    PreviewReportOptions,
     PriorReportOptions,
     ReportOptions,
     TransferReportOptions,
@@ -171,3 +172,21 @@ def materials(output: Path, references: Path | None, common: Common) -> None:
     with reporter(common) as progress:
         rows = report_materials(output, references, progress)
     show(common, {"rows": [{"name": row.name, "slope": row.contrast.slope, "own": row.own} for row in rows]}, summary(rows))
+
+
+@command.command()
+@click.argument("asset", type=INPUT, metavar="ASSET")
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV and the pictures.")
+@click.option("--cycles", default="", metavar="PYTHON", help="A Python that has the package bpy (Blender).")
+@click.option("--three", default="", metavar="FOLDER", help="A folder node_modules that has three; needs Chromium.")
+@common_options
+def preview(asset: Path, output: Path, common: Common, **chosen: Any) -> None:
+    """Render the model of the folder ASSET in other programs, as preview.json says, and compare with preview.png."""
+    options = PreviewReportOptions(**chosen)
+    if plan(common, "compare into", output, options):
+        return
+    from stages.report.preview import report_preview
+
+    rows = report_preview(asset, output, options)
+    show(common, {"rows": [dataclasses.asdict(row) for row in rows]},
+         [f"{row.renderer:7} view {row.view}  {row.psnr:.2f} dB" for row in rows])

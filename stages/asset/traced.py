@@ -10,14 +10,17 @@ from numpy.typing import NDArray
 from stages.asset.corners import flipped_loops, gltf_uv, loop_normals, loop_parts, loop_tangents, part_frames, unit
 from stages.asset.passed_on import PassedOn
 from stages.core.artifact import Artifact
+from stages.core.color import srgb_decode
 from stages.core.images import decode_image
-from stages.light.normal_maps import REPEAT, NormalMap, NormalMaps
+from stages.light.emission import Emission
+from stages.light.lookup import REPEAT, Texture
+from stages.light.normal_maps import NormalMap, NormalMaps
 from stages.light.scene import Scene
 
 
 def traced_scene(prep: Artifact) -> Scene:
-    """The scene of a prepared mesh; normals lean by the source's normal maps, where its UVs were kept."""
-    return Scene(prep["vertices"], prep["triangles"], prep["normals"], source_bumps(prep))
+    """The scene of a prepared mesh; normals lean by the source's normal maps, and it emits, where its UVs were kept."""
+    return Scene(prep["vertices"], prep["triangles"], prep["normals"], source_bumps(prep), source_emission(prep))
 
 
 def source_bumps(prep: Artifact) -> NormalMaps | None:
@@ -28,10 +31,30 @@ def source_bumps(prep: Artifact) -> NormalMaps | None:
         return None
     names = list(textures)
     maps = [normal_map(passed_on, textures[name]) for name in names]
-    of_part = [names.index(part["material"]) if part["material"] in textures else -1 for part in _parts(prep)]
-    bumps = world_frames(prep, {number for number, row in enumerate(of_part) if row >= 0})
-    of_triangle = np.array(of_part, np.int32)[loop_parts(prep)[prep["triangle_loops"][:, 0]]]
-    return replace(bumps, maps=maps, of_triangle=of_triangle)
+    of_part = _rows(prep, names)
+    bumps = world_frames(prep, set(np.flatnonzero(of_part >= 0).tolist()))
+    return replace(bumps, maps=maps, of_triangle=of_part[_part_of_triangle(prep)])
+
+
+def source_emission(prep: Artifact) -> Emission | None:
+    """What the source's materials emit, or None."""
+    passed_on = PassedOn.of(prep)
+    shining = {name: of for name, of in passed_on.materials.items() if any(of.get("emissiveFactor", ()))}
+    if not shining:
+        return None
+    textures = [emissive_texture(passed_on, of) for of in shining.values()]
+    of_triangle = _rows(prep, list(shining))[_part_of_triangle(prep)]
+    return Emission(textures, of_triangle, gltf_uv(prep)[prep["triangle_loops"]])
+
+
+def emissive_texture(passed_on: PassedOn, material: dict[str, Any]) -> Texture:
+    """glTF's emission of a material: texture times factor times strength, linear."""
+    extension = material.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+    factor = np.array(material["emissiveFactor"], np.float32) * np.float32(extension.get("emissiveStrength", 1.0))
+    if "emissiveTexture" not in material:
+        return Texture(factor[None, None])
+    worn = source_texture(passed_on, material["emissiveTexture"])
+    return replace(worn, image=srgb_decode(worn.image[..., :3]).astype(np.float32) * factor)
 
 
 def baked_bumps(prep: Artifact, normal: NDArray[np.float32]) -> NormalMaps:
@@ -57,12 +80,20 @@ def world_frames(prep: Artifact, parts: Collection[int] | None = None) -> Normal
 
 def normal_map(passed_on: PassedOn, info: dict[str, Any]) -> NormalMap:
     """A source's normal map, decoded. Args: info: glTF's normalTexture."""
+    worn = source_texture(passed_on, info)
+    return NormalMap(worn.image[..., :3] * np.float32(2) - np.float32(1), info.get("scale", 1.0), worn.matrix, worn.wrap)
+
+
+def source_texture(passed_on: PassedOn, info: dict[str, Any]) -> Texture:
+    """A texture of the source, its values as stored, in [0, 1]. Args: info: glTF's reference to it."""
     texture = passed_on.textures[info["index"]]
-    vectors = decode_image(passed_on.images[texture["image"]][2])[..., :3] * np.float32(2) - np.float32(1)
     sampler = texture.get("sampler", {})
-    wrap = sampler.get("wrapS", REPEAT), sampler.get("wrapT", REPEAT)
     transform = info.get("extensions", {}).get("KHR_texture_transform")
-    return NormalMap(vectors, info.get("scale", 1.0), None if transform is None else uv_matrix(transform), wrap)
+    return Texture(
+        decode_image(passed_on.images[texture["image"]][2]),
+        None if transform is None else uv_matrix(transform),
+        (sampler.get("wrapS", REPEAT), sampler.get("wrapT", REPEAT)),
+    )
 
 
 def uv_matrix(transform: dict[str, Any]) -> NDArray[np.float64]:
@@ -70,6 +101,15 @@ def uv_matrix(transform: dict[str, Any]) -> NDArray[np.float64]:
     c, s = np.cos(transform.get("rotation", 0.0)), np.sin(transform.get("rotation", 0.0))
     linear = np.array([[c, s], [-s, c]]) * np.array(transform.get("scale", (1.0, 1.0)))
     return np.concatenate([linear, np.array(transform.get("offset", (0.0, 0.0)), float)[:, None]], 1)
+
+
+def _rows(prep: Artifact, names: list[str]) -> NDArray[np.int32]:
+    """For each part the place of its material among some names, or -1."""
+    return np.array([names.index(part["material"]) if part["material"] in names else -1 for part in _parts(prep)], np.int32)
+
+
+def _part_of_triangle(prep: Artifact) -> NDArray:
+    return loop_parts(prep)[prep["triangle_loops"][:, 0]]
 
 
 def _parts(prep: Artifact) -> list[dict[str, Any]]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from stages.asset.report_page import Page, PageView, Shot, write_page
 from stages.asset.report_view import PageLight
 from stages.bake.checks import checks
-from stages.bake.preview import BACKDROP, EXPOSURE, FOV_Y, GROUND, VIEWS, backdrop, camera, draw_view
+from stages.bake.preview import Look, draw_view
 from stages.bake.raster import Surface
+from stages.bake.studio import BACKDROP, EXPOSURE, FOV_Y, GROUND, VIEWS, backdrop, camera
 from stages.core.artifact import Artifact
 from stages.core.color import srgb_encode
 from stages.core.progress import Progress
@@ -89,11 +90,11 @@ def report_page(
 
 def pictures(scene: Scene, uv: NDArray[np.float32], maps: NDArray[np.float32], size: int) -> list[Shot]:
     """The asset from two sides under lights that nothing was trained on; the view in 3-D has a third one, preview.png's."""
-    shots = []
+    shots, look = [], Look(scene, uv * (1, -1) + (0, 1), maps)
     used = scene.vertices[np.unique(scene.triangles)].astype(np.float64)
     for light in (dusk(), softbox()):
         for azimuth, elevation in SHOT_VIEWS:
-            picture, _ = draw_view(scene, light, uv, maps, camera(used, azimuth, elevation), size)
+            picture = draw_view(look, light, camera(used, azimuth, elevation), size)
             caption = f"{light.name.capitalize()}, {'front' if azimuth < 90 else 'back'}"
             shots.append(Shot(caption, srgb_encode(picture.over(backdrop(size)))))
     return shots

@@ -1,52 +1,42 @@
 """preview.png: the baked asset as an engine would draw it, from eight sides; below, its maps without light.
 
-The textures are read back bilinearly at the hits of camera rays, as a renderer does, and shaded by the project's own
-transport under an environment that distillation never saw. Geometry and textures are sampled at four points a pixel,
-the light at one. The picture is sRGB without a tone curve: Blender's "Standard" view, three.js without tone mapping.
+Geometry, textures and light are sampled at four points a pixel. Textures and normal maps are averaged over what each point
+stands for, as seen by the camera; where the normals of a patch differ, the patch is rougher by as much. The light is the
+project's own transport under an environment that distillation never saw (`stages.bake.studio`). The picture is sRGB
+without a tone curve: Blender's "Standard" view, three.js without tone mapping.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import OpenImageIO as oiio
 import torch
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
 
-from stages.bake.raster import Surface
+from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
 from stages.core.color import srgb_encode
-from stages.core.frames import camera_rays, look_at
+from stages.core.frames import camera_rays
 from stages.core.parallel import in_parallel
 from stages.core.progress import Progress
 from stages.core.shading import Material, shade
 from stages.light.environment import Environment
-from stages.light.gbuffer import trace_view
+from stages.light.gbuffer import GBuffer, facing, surface_points
 from stages.light.lights import preview_light
-from stages.light.scene import Scene
+from stages.light.lookup import look_up
+from stages.light.scene import Hits, Scene
 from stages.light.transport import Quality, cached_light_set, light_transport
-
-FOV_Y = np.radians(30.0)
-"""Vertical field of view: a mild telephoto, as product pictures have it."""
-
-FILL = 0.86
-"""Share of the picture's half-width that the object's bounding sphere, seen from a view, may take."""
-
-VIEWS = tuple((45.0 * k, (18.0, 18.0, 8.0, 38.0)[k % 4]) for k in range(8))
-"""Azimuth and elevation of the eight views, degrees."""
-
-GROUND, BACKDROP = 0.105, 0.30
-"""Linear grey at the bottom and the top of each picture's background."""
 
 MAP_BACKDROP = (0.16, 0.18, 0.22)
 """Encoded background of the maps: slightly blue, so that no grey value is lost in it."""
 
-EXPOSURE = 0.8
-"""Applied to radiance before the picture is encoded."""
+RAYS = Quality(lobe=24, light=8, extra=False)
+"""Rays that a point traces, a quarter of its pixel."""
 
-COLUMNS = 4
+TILE, MARGIN = 320, 16
+"""Points along an edge that are traced at once, which bounds memory, and how many around them know of each other's noise."""
 
-RAYS = Quality(lobe=32, light=12, extra=False)
-"""Rays that a pixel traces: a little grain in the shadows stays."""
+STRETCH = 4.0
+"""How many times longer than wide what a point stands for may be: towards the horizon it would reach beyond the surface."""
 
 TEXT_HEIGHT = 14
 """Pixels."""
@@ -54,15 +44,18 @@ TEXT_HEIGHT = 14
 
 @dataclass(frozen=True)
 class Picture:
-    """One view at two samples along each edge of a pixel. alpha: (2H, 2W) bool; color: (2H, 2W, 3) linear."""
+    """One view at two samples along each edge of a pixel.
+
+    alpha: (2H, 2W) bool. color: (2H, 2W, 3) linear. material: (2H, 2W, 5) albedo, roughness, metallic.
+    """
 
     alpha: NDArray[np.bool_]
     color: NDArray[np.float32]
+    material: NDArray[np.float32]
 
     def over(self, background: NDArray[np.float32]) -> NDArray[np.float32]:
         """The picture at one value a pixel, over a background (H, W, 3) or wider to broadcast. Returns: linear."""
-        alpha = _halve(self.alpha[..., None].astype(np.float32))
-        return _halve(np.where(self.alpha[..., None], self.color, 0)) + (1 - alpha) * background
+        return over(self.alpha, self.color, background)
 
 
 def contact_sheet(
@@ -76,68 +69,134 @@ def contact_sheet(
     Returns:
         (rows, columns, 3) encoded sRGB in [0, 1].
     """
-    light, used = preview_light(), scene.vertices[np.unique(scene.triangles)].astype(np.float64)
+    light = preview_light()
     progress("preview", 0, 1)
     cached_light_set((light,))  # once, not in every thread
-    views = [camera(used, azimuth, elevation) for azimuth, elevation in VIEWS]
-    drawn = in_parallel(lambda c2w: draw_view(scene, light, uv, maps, c2w, size), views)
-    cells = [srgb_encode(shaded.over(backdrop(size))) for shaded, _ in drawn]
-    cells += [*material_cells(drawn[0][1], size), labelled(atlas(maps, size), "albedo.png")]
+    look = Look(scene, uv * (1, -1) + (0, 1), maps)
+    drawn = in_parallel(lambda c2w: draw_view(look, light, c2w, size), cameras(scene.vertices, scene.triangles))
+    cells = [srgb_encode(picture.over(backdrop(size))) for picture in drawn]
+    cells += [*material_cells(drawn[0]), labelled(atlas(maps, size), "albedo.png")]
     progress("preview", 1, 1)
     return np.concatenate([np.concatenate(cells[k : k + COLUMNS], 1) for k in range(0, len(cells), COLUMNS)], 0)
 
 
-def camera(points: NDArray[np.float64], azimuth: float, elevation: float) -> NDArray[np.float64]:
-    """c2w (4, 4) of a view, degrees, at the distance from which the object's points (N, 3) fill the picture."""
-    a, e = np.radians(azimuth), np.radians(elevation)
-    towards = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
-    center = (points.min(0) + points.max(0)) / 2
-    c2w = look_at(center + towards, center, np.array([0.0, 0.0, 1.0]))
-    local = (points - center) @ c2w[:3, :3]  # x right, y up, z to the camera
-    distance = (local[:, 2] + np.maximum(np.abs(local[:, 0]), np.abs(local[:, 1])) / (FILL * np.tan(FOV_Y / 2))).max()
-    c2w[:3, 3] = center + towards * distance
-    return c2w
+@dataclass(frozen=True)
+class Look:
+    """A mesh and its textures. uv: (F, 3, 2), v down. maps: (H, W, 5)."""
+
+    scene: Scene
+    uv: NDArray[np.float32]
+    maps: NDArray[np.float32]
+
+    def material(self, points: GBuffer, across: NDArray) -> NDArray[np.float32]:
+        """Albedo, roughness and metallic (P, 5), the mean over a patch around each point. Args: across: of `footprint`."""
+        uv = self.uv[points.triangle]
+        middle, edges = np.einsum("pk,pkd->pd", points.barycentric, uv), np.einsum("pek,pkd->ped", across, uv)
+        return look_up(self.maps, middle, edges)[:, :5]
+
+    def points(
+        self, hits: Hits, directions: NDArray, mask: NDArray[np.bool_], c2w: NDArray, step: float
+    ) -> tuple[GBuffer, NDArray, NDArray]:
+        """What some rays hit, its normals averaged as textures are.
+
+        Args:
+            step: between rays, at distance 1 along the camera's axis.
+        Returns:
+            the points; (P, 2, 3) of `footprint`; (P,) by how much normals differ within a patch, as a squared slope.
+        """
+        smooth = surface_points(self.scene.bumped(None), hits, directions, mask)
+        across = footprint(self.scene, smooth, directions[hits.mask], c2w, step)
+        if self.scene.bumps is None:
+            return smooth, across, np.zeros(len(smooth.n), np.float32)
+        side = np.sign((self.scene.geometric_normal(smooth.triangle) * smooth.ng).sum(1, keepdims=True))
+        outer = self.scene.smooth_normal(smooth.triangle, smooth.barycentric)
+        n, length = self.scene.bumps.filtered(outer, smooth.triangle, smooth.barycentric, across)
+        spread = (1 - length) / np.maximum(length, 1e-3)
+        return replace(smooth, n=facing(n * side, smooth.wo)), across, spread
 
 
-def draw_view(
-    scene: Scene, light: Environment, uv: NDArray[np.float32], maps: NDArray[np.float32], c2w: NDArray, size: int
-) -> tuple[Picture, tuple[NDArray, NDArray]]:
-    """One view. Returns: the shaded picture; where its samples hit (2S, 2S) and their material (N, 5)."""
-    fine = scene.intersect(*camera_rays(c2w, FOV_Y, 2 * size, 2 * size))
-    surface = Surface(fine.triangle, np.ascontiguousarray(fine.barycentric[:, :2])).where(fine.mask)
-    sampled, mask = bilinear(maps, surface.interpolate(uv)), fine.mask.reshape(2 * size, 2 * size)
-    color = np.zeros((2 * size, 2 * size, 3), np.float32)
-    coarse = trace_view(scene, c2w, FOV_Y, size, size)
-    if coarse.mask.any():
-        transport = light_transport(scene, coarse, [light], RAYS, seed=0)[0]
-        values = torch.from_numpy(sampled[:, :5])
-        material = Material.of(values)
-        nearest = torch.from_numpy(_nearest_hit(coarse.mask)[mask])
-        color[mask] = EXPOSURE * shade(transport[nearest], material).numpy()
-    return Picture(mask, color), (mask, sampled)
+def draw_view(look: Look, light: Environment, c2w: NDArray, size: int) -> Picture:
+    """One view."""
+    across = 2 * size
+    directions = camera_rays(c2w, FOV_Y, across, across)[1].reshape(across, across, 3)
+    alpha, color, material = (np.zeros((across, across, k), np.float32) for k in (1, 3, 5))
+    for top in range(0, across, TILE):
+        for left in range(0, across, TILE):
+            wide = [slice(max(first - MARGIN, 0), first + TILE + MARGIN) for first in (top, left)]
+            inner = tuple(slice(first, first + TILE) for first in (top, left))
+            kept = tuple(
+                slice(first - part.start, first - part.start + TILE) for first, part in zip((top, left), wide, strict=True)
+            )
+            drawn = _draw(look, light, directions[wide[0], wide[1]], c2w, 2 * np.tan(FOV_Y / 2) / across)
+            for whole, part in zip((alpha, color, material), drawn, strict=True):
+                whole[inner] = part[kept]
+    return Picture(alpha[..., 0] > 0, color, material)
 
 
-def bilinear(maps: NDArray[np.float32], uv: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Texture look-up, v up, clamped to the edge. Args: maps (H, W, C); uv (N, 2). Returns: (N, C)."""
-    height, width, _ = maps.shape
-    x = np.clip(uv[:, 0] * width - 0.5, 0, width - 1)
-    y = np.clip((1 - uv[:, 1]) * height - 0.5, 0, height - 1)
-    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
-    right, bottom = np.minimum(left + 1, width - 1), np.minimum(top + 1, height - 1)
-    fx, fy = (x - left)[:, None].astype(np.float32), (y - top)[:, None].astype(np.float32)
-    upper = maps[top, left] * (1 - fx) + maps[top, right] * fx
-    lower = maps[bottom, left] * (1 - fx) + maps[bottom, right] * fx
-    return upper * (1 - fy) + lower * fy
+def _draw(look: Look, light: Environment, directions: NDArray, c2w: NDArray, step: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Alpha (h, w, 1), colour and material of a tile. Args: directions: (h, w, 3)."""
+    shape, rays = directions.shape[:2], directions.reshape(-1, 3)
+    hits = look.scene.intersect(np.broadcast_to(c2w[:3, 3], rays.shape), rays)
+    mask = hits.mask.reshape(shape)
+    alpha, color, material = (np.zeros((*shape, k), np.float32) for k in (1, 3, 5))
+    if mask.any():
+        points, across, spread = look.points(hits, rays, mask, c2w, step)
+        values = look.material(points, across)
+        alpha[mask], material[mask] = 1, values
+        values[:, 3] = rougher(values[:, 3], spread)
+        transport = light_transport(look.scene, points, [light], RAYS, seed=0)[0]
+        color[mask] = shade(transport, Material.of(torch.from_numpy(values))).numpy()
+        if look.scene.emission is not None:
+            color[mask] += look.scene.emission.at(points.triangle, points.barycentric, across)
+        color *= np.float32(EXPOSURE)
+    return alpha, color, material
 
 
-def material_cells(material: tuple[NDArray, NDArray], size: int) -> list[NDArray[np.float32]]:
+def footprint(scene: Scene, points: GBuffer, directions: NDArray, c2w: NDArray, step: float) -> NDArray[np.float32]:
+    """The part of the surface that each point stands for: a parallelogram, by its edges in barycentric coordinates.
+
+    The neighbouring ray meets the point's own plane. Source: Igehy 1999, "Tracing Ray Differentials".
+
+    Args:
+        directions: (P, 3) of the rays. step: between rays, at distance 1 along the camera's axis.
+    Returns:
+        (P, 2, 3).
+    """
+    a, b, c = (scene.vertices[scene.triangles[points.triangle, k]].astype(np.float64) for k in range(3))
+    first, second = b - a, c - a
+    normal = np.cross(first, second)
+    squared = (normal**2).sum(1)
+    sound = squared > 0
+    depth = points.depth[points.mask][:, None].astype(np.float64)
+    towards = (directions * points.ng).sum(1, keepdims=True)
+    least = np.linalg.norm(directions, axis=1, keepdims=True) / STRETCH
+    towards = -np.maximum(np.abs(towards), least)  # ng faces the viewer
+    result = np.zeros((len(depth), 2, 3), np.float32)
+    for axis in (0, 1):
+        aside = np.broadcast_to(c2w[:3, axis] * step, directions.shape)
+        moved = depth * (aside - directions * (aside * points.ng).sum(1, keepdims=True) / towards)
+        along = np.stack([np.cross(moved, second), np.cross(first, moved)], 1)  # (P, 2, 3)
+        weights = np.einsum("pkd,pd->pk", along, normal) / np.where(sound, squared, 1)[:, None] * sound[:, None]
+        result[:, axis] = np.c_[-weights.sum(1), weights]
+    return result
+
+
+def rougher(roughness: NDArray[np.float32], spread: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Roughness of a patch whose normals differ by `spread`, a variance of slopes.
+
+    Source: Toksvig 2005, "Mipmapping Normal Maps"; for GGX, alpha² grows by twice the variance: Kaplanyan et al. 2016,
+    "Filtering Distributions of Normals for Shading Antialiasing".
+    """
+    return np.minimum(roughness**4 + 2 * spread, 1) ** np.float32(0.25)
+
+
+def material_cells(picture: Picture) -> list[NDArray[np.float32]]:
     """Albedo, roughness and metallic of a view without light, encoded as their PNGs are."""
-    mask, sampled = material
     cells = []
     for name, columns in (("albedo", slice(0, 3)), ("roughness", slice(3, 4)), ("metallic", slice(4, 5))):
-        color = np.zeros((*mask.shape, 3), np.float32)
-        color[mask] = srgb_encode(sampled[:, columns]) if name == "albedo" else sampled[:, columns]
-        cells.append(labelled(Picture(mask, color).over(np.array(MAP_BACKDROP, np.float32)), name))
+        values = picture.material[..., columns]
+        shown = srgb_encode(values) if name == "albedo" else np.repeat(values, 3, 2)
+        cells.append(labelled(over(picture.alpha, shown, np.array(MAP_BACKDROP, np.float32)), name))
     return cells
 
 
@@ -156,20 +215,13 @@ def labelled(cell: NDArray[np.float32], text: str) -> NDArray[np.float32]:
     return np.asarray(picture.get_pixels(oiio.FLOAT), np.float32).reshape(cell.shape)
 
 
-def _nearest_hit(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """For each sample at twice the size, the number of the hit pixel nearest to it. Returns: (2H, 2W)."""
-    row, column = distance_transform_edt(~mask, return_distances=False, return_indices=True)
-    number = (np.cumsum(mask.reshape(-1)) - 1).reshape(mask.shape)[row, column]
-    return np.repeat(np.repeat(number, 2, 0), 2, 1)
+def over(alpha: NDArray[np.bool_], color: NDArray[np.float32], background: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Samples (2H, 2W, 3) where there are any, else a background, at one value a pixel. Returns: (H, W, 3)."""
+    covered = _halve(alpha[..., None].astype(np.float32))
+    return _halve(np.where(alpha[..., None], color, 0)) + (1 - covered) * background
 
 
 def _halve(values: NDArray[np.float32]) -> NDArray[np.float32]:
     """Mean of each 2 x 2 block. Args: (2H, 2W, C). Returns: (H, W, C)."""
     height, width, count = values.shape
     return values.reshape(height // 2, 2, width // 2, 2, count).mean((1, 3))
-
-
-def backdrop(size: int) -> NDArray[np.float32]:
-    """A neutral gradient, darker below. Returns: (size, 1, 3) linear."""
-    ramp = np.linspace(BACKDROP, GROUND, size, dtype=np.float32)
-    return np.repeat(ramp[:, None, None], 3, 2)

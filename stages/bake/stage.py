@@ -23,6 +23,7 @@ from stages.bake.page import report_page
 from stages.bake.preview import contact_sheet
 from stages.bake.raster import Layout, Surface, touched_texels
 from stages.bake.relief import relief_normals
+from stages.bake.studio import write_studio
 from stages.bake.texels import Texels
 from stages.bake.visibility import Views, is_open, patches, seen_points
 from stages.core.artifact import (
@@ -234,7 +235,8 @@ def write_asset(
         write_obj(out / "model.obj", mesh, relief=maps.normal is not None)
         files += ["model.obj", "model.mtl"]
     write_png(out / "preview.png", contact_sheet(scene, mesh["uv"], maps.material, options.preview_size, progress))
-    return [*files, "preview.png"], model.notes
+    files += ["preview.png", *write_studio(out, mesh, options.preview_size)]
+    return files, model.notes
 
 
 def look_of(folder: Path, maps: Maps, passed_on: PassedOn) -> Look:

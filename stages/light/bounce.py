@@ -23,7 +23,7 @@ from stages.light.gbuffer import GBuffer, surface_points
 from stages.light.light_set import MAX_LIGHTS, LightSet
 from stages.light.scene import Scene
 from stages.light.terms import BLENDER, Terms
-from stages.light.transport import Quality, Rays, Sums, cached_light_set, gather, smoothed, tiles, trace
+from stages.light.transport import Quality, Rays, Sums, cached_light_set, gather, smoothed, starts, tiles, trace
 from stages.light.transport_kernels import accumulate_bounce
 
 THERE = Quality(6, 4, extra=False, smooth=False, averaged=True)
@@ -100,7 +100,7 @@ def _chunk(
     n, wo = points.n[part], points.wo[part]
     frame = (n, *tangent_frame(n))
     unused = np.zeros((len(part), len(lights.cells.energy)), np.float32)
-    drawn = rays.draw(frame, wo, points.origin[part], pixel, terms.alphas, lights, unused)
+    drawn = rays.draw(frame, wo, starts(points, part), pixel, terms.alphas, lights, unused)
     hits = scene.intersect(drawn.origin, drawn.direction)
     if not hits.mask.any():
         return

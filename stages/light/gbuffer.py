@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from stages.core.albedo import MIN_COSINE
 from stages.core.frames import camera_rays
-from stages.light.scene import Hits, Scene
+from stages.light.scene import OFFSET, Hits, Scene
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,10 @@ class GBuffer:
     wo: NDArray[np.float32]
     triangle: NDArray[np.int32]
     barycentric: NDArray[np.float32]
+
+    def surface(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Where steep rays leave some points, (R, 3): the triangle itself; `origin` lies on the smooth surface over it."""
+        return self.point[rows] + np.float32(OFFSET) * self.ng[rows]
 
     def __getitem__(self, rows: NDArray[np.int64]) -> "GBuffer":
         """Some of the points, by ascending rows, as a view in which the others are not seen."""

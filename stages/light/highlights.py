@@ -19,6 +19,7 @@ from scipy.ndimage import convolve1d
 from stages.core.albedo import MIN_COSINE
 from stages.light.gbuffer import GBuffer
 from stages.light.lamps import Lamps
+from stages.light.light_set import CHANNELS
 from stages.light.reconstruction import BLOCK, Neighbours, fast, in_parts
 
 CONE = 0.15
@@ -28,10 +29,12 @@ AROUND = (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25)
 """How the blocks around one count in how far its highlights are seen: fewer are too noisy to tell."""
 
 
-def open_highlights(points: GBuffer, lamps: Lamps, alphas: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What points show of lamps with nothing in the way, (P, 2 S, CHANNELS): terms A of the S lobes `alphas`, then B."""
-    shown = np.empty((len(points.n), 2 * len(alphas), lamps.flux.shape[1]), np.float32)
-    light = (lamps.direction, lamps.spread, lamps.flux)
+def open_highlights(
+    points: GBuffer, lamps: Lamps, alphas: NDArray[np.float32], channels: int = CHANNELS
+) -> NDArray[np.float32]:
+    """What points show of lamps with nothing in the way, (P, 2 S, channels): terms A of the S lobes `alphas`, then B."""
+    shown = np.empty((len(points.n), 2 * len(alphas), channels), np.float32)
+    light = (lamps.direction, lamps.spread, np.ascontiguousarray(lamps.flux[:, :channels]))
     in_parts(lambda start, end: _show(points.n, points.wo, alphas, light, start, end, shown), len(shown), 512)
     return shown
 

@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-REPEAT, CLAMP, MIRROR = 10497, 33071, 33648
-"""How a texture goes on beyond its edge, glTF's (and OpenGL's) numbers."""
+from stages.light.lookup import REPEAT, Texture
 
 LEAST_Z = 1e-3
 """A mapped normal leans by less than 90 degrees; one that leans further is held at this cosine."""
@@ -29,31 +28,20 @@ class NormalMap:
     matrix: NDArray[np.float64] | None = None
     wrap: tuple[int, int] = (REPEAT, REPEAT)
 
-    def at(self, uv: NDArray) -> NDArray[np.float32]:
-        """The unit vectors at uv (K, 2), v down, bilinear. Returns: (K, 3)."""
-        if self.matrix is not None:
-            uv = uv @ self.matrix[:, :2].T + self.matrix[:, 2]
-        height, width, _ = self.vectors.shape
-        x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
-        column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-        fx, fy = (x - column)[:, None], (y - row)[:, None]
-        (left, right), (top, bottom) = (
-            (_wrapped(first, size, mode), _wrapped(first + 1, size, mode))
-            for first, size, mode in zip((column, row), (width, height), self.wrap, strict=True)
-        )
-        upper = self.vectors[top, left] * (1 - fx) + self.vectors[top, right] * fx
-        lower = self.vectors[bottom, left] * (1 - fx) + self.vectors[bottom, right] * fx
-        vector = (upper * (1 - fy) + lower * fy) * [self.scale, self.scale, 1.0]
+    def at(self, uv: NDArray, across: NDArray | None = None) -> NDArray[np.float32]:
+        """The mean vectors over patches of the map, of length 1 where all are alike.
+
+        Args:
+            uv: (K, 2), v down. across: (K, 2, 2) edges of the patches; points where None.
+        Returns:
+            (K, 3).
+        """
+        vector = Texture(self.vectors, self.matrix, self.wrap).at(uv, across)
         length = np.linalg.norm(vector, axis=1, keepdims=True)
-        return np.where(length > 0, vector / np.where(length > 0, length, 1), (0.0, 0.0, 1.0)).astype(np.float32)
-
-
-def _wrapped(index: NDArray[np.int64], size: int, mode: int) -> NDArray[np.int64]:
-    if mode == CLAMP:
-        return np.clip(index, 0, size - 1)
-    if mode == MIRROR:
-        return np.minimum(index % (2 * size), 2 * size - 1 - index % (2 * size))
-    return index % size
+        scaled = vector * np.array([self.scale, self.scale, 1], np.float32)
+        stretch = np.linalg.norm(scaled, axis=1, keepdims=True)
+        kept = np.where(across is None, 1, length.clip(0, 1)) / np.where(stretch > 0, stretch, 1)
+        return np.where(stretch > 0, scaled * kept, (0.0, 0.0, 1.0)).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -71,17 +59,32 @@ class NormalMaps:
 
     def leaning(self, n: NDArray, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
         """Normals turned as the maps say. Args: n (P, 3) interpolated, unit; (P,); (P, 3). Returns: (P, 3) unit."""
-        result = np.array(n, np.float32)
+        return self.filtered(n, triangle, barycentric, None)[0]
+
+    def filtered(
+        self, n: NDArray, triangle: NDArray, barycentric: NDArray, across: NDArray | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Normals turned as the maps say on average over a patch of the surface around each point.
+
+        Args:
+            n: (P, 3) interpolated, unit. triangle: (P,). barycentric: (P, 3). across: (P, 2, 3), the patch's edges in
+            barycentric coordinates; points where None.
+        Returns:
+            (P, 3) unit; (P,) length of the mean of the maps' unit vectors, 1 where they are all alike.
+        """
+        result, length = np.array(n, np.float32), np.ones(len(n), np.float32)
         row = self.of_triangle[triangle]
         for number, one in enumerate(self.maps):
             mine = np.flatnonzero(row == number)
             at, weights = triangle[mine], barycentric[mine]
-            vector = one.at(np.einsum("pk,pkd->pd", weights, self.uv[at]))
+            edges = None if across is None else np.einsum("pek,pkd->ped", across[mine], self.uv[at])
+            vector = one.at(np.einsum("pk,pkd->pd", weights, self.uv[at]), edges)
+            length[mine] = np.linalg.norm(vector, axis=1)
             t, b = frame(result[mine], np.einsum("pk,pkd->pd", weights, self.tangents[at]))
             z = np.maximum(vector[:, 2:], LEAST_Z)
             leaned = vector[:, :1] * t + vector[:, 1:2] * b + z * result[mine]
             result[mine] = leaned / np.linalg.norm(leaned, axis=1, keepdims=True)
-        return result
+        return result, length
 
 
 def frame(n: NDArray, tangent: NDArray) -> tuple[NDArray, NDArray]:

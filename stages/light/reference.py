@@ -18,6 +18,7 @@ from stages.light.blender import F0 as BLENDER_F0
 from stages.light.environment import Environment, directions_of_texels, lookup
 from stages.light.gbuffer import GBuffer, surface_points
 from stages.light.scene import Scene
+from stages.light.transport_kernels import GRAZING
 
 
 def reference_transport(
@@ -44,14 +45,20 @@ def reference_transport(
     return Transport(E, A, B, cosine)
 
 
+def starts(points: GBuffer, i: int, wi: NDArray) -> NDArray[np.float64]:
+    """Where rays from point i start, (D, 3): the steeper to its triangle, the nearer to that. Args: wi: (D, 3)."""
+    lifted = 1 - (wi @ points.ng[i].astype(np.float64) / GRAZING).clip(0, 1)[:, None]
+    surface = points.surface(np.array([i])).astype(np.float64)
+    return surface + lifted * (points.origin[i] - surface)
+
+
 def _point(
     scene: Scene, points: GBuffer, environment: Environment, i: int, wi: NDArray, light: NDArray
 ) -> tuple[NDArray, NDArray, NDArray]:
     n, wo = points.n[i].astype(np.float64), points.wo[i].astype(np.float64)
     above = wi @ n > 0
     wi, light = wi[above], light[above]
-    origin = np.broadcast_to(points.origin[i], wi.shape)
-    visible = ~scene.occluded(origin, wi)
+    visible = ~scene.occluded(starts(points, i, wi), wi)
     wi, light = wi[visible], light[visible]
     n_l, n_v = wi @ n, float(wo @ n)
     wm = wi + wo
@@ -62,7 +69,7 @@ def _point(
     A, B = np.zeros((2, len(KNOTS), 3))
     for k, roughness in enumerate(KNOTS):
         if roughness == 0:
-            A[k], B[k] = _mirror(scene, environment, points.origin[i], n, wo)
+            A[k], B[k] = _mirror(scene, environment, points, i, n, wo)
             continue
         a2 = alpha_from_roughness(roughness) ** 2
         sin2 = (np.cross(wm, n) ** 2).sum(-1)
@@ -74,11 +81,11 @@ def _point(
 
 
 def _mirror(
-    scene: Scene, environment: Environment, origin: NDArray, n: NDArray, wo: NDArray
+    scene: Scene, environment: Environment, points: GBuffer, i: int, n: NDArray, wo: NDArray
 ) -> tuple[NDArray, NDArray]:
     n_v = float(wo @ n)
     wi = (2 * n_v * n - wo)[None]
-    radiance = lookup(environment.radiance, wi)[0] * (not scene.occluded(origin[None], wi)[0])
+    radiance = lookup(environment.radiance, wi)[0] * (not scene.occluded(starts(points, i, wi), wi)[0])
     s = (1 - n_v) ** 5
     return (1 - s) * radiance, s * radiance
 
@@ -99,9 +106,9 @@ def _light_maps(
     """(6, 3) at point i."""
     n, wo = points.n[i].astype(np.float64), points.wo[i].astype(np.float64)
     above = wi @ n > 0
-    shown = _shown(scene, points.origin[i], environment, wi[above], bounce)  # (D, 6, 3)
+    shown = _shown(scene, starts(points, i, wi[above]), environment, wi[above], bounce)  # (D, 6, 3)
     mirror = 2 * float(wo @ n) * n - wo
-    reflected = _shown(scene, points.origin[i], environment, mirror[None], bounce)[0]  # (6, 3)
+    reflected = _shown(scene, starts(points, i, mirror[None]), environment, mirror[None], bounce)[0]  # (6, 3)
     maps = np.zeros((len(LIGHT_MAPS), 3))
     for j, (metallic, roughness) in enumerate(LIGHT_MAPS):
         diffuse, glossy, fresnel = _principled(n, wo, wi[above], roughness)
@@ -115,8 +122,8 @@ def _light_maps(
 def _shown(
     scene: Scene, origin: NDArray, environment: Environment, wi: NDArray, bounce: bool
 ) -> NDArray[np.float64]:
-    """What a point sees along directions (D, 3), for each map: the light, or what the surface there reflects of it."""
-    hits = scene.intersect(np.broadcast_to(origin, wi.shape), wi)
+    """What a point sees along rays, origin and wi (D, 3), for each map: the light, or what the surface there reflects of it."""
+    hits = scene.intersect(origin, wi)
     result = np.repeat(lookup(environment.radiance, wi)[:, None] * ~hits.mask[:, None, None], len(LIGHT_MAPS), 1)
     if bounce and hits.mask.any():
         there = surface_points(scene, hits, wi, hits.mask[None])

@@ -14,6 +14,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from stages.light.emission import Emission
 from stages.light.normal_maps import NormalMaps
 
 OFFSET = 2e-5
@@ -64,13 +65,18 @@ class Scene:
 
     Args:
         vertices: (V, 3) float32 world. triangles: (F, 3) int32. normals: (F, 3, 3) float32 unit, per corner.
-        bumps: normal maps that shading normals follow, if any.
+        bumps: normal maps that shading normals follow, if any. emission: what shines by itself, if anything; pictures show it.
     """
 
     def __init__(
-        self, vertices: NDArray, triangles: NDArray, normals: NDArray, bumps: NormalMaps | None = None
+        self,
+        vertices: NDArray,
+        triangles: NDArray,
+        normals: NDArray,
+        bumps: NormalMaps | None = None,
+        emission: Emission | None = None,
     ) -> None:
-        self.bumps = bumps
+        self.bumps, self.emission = bumps, emission
         self.vertices = np.ascontiguousarray(vertices, np.float32)
         self.triangles = np.ascontiguousarray(triangles, np.int32)
         self.normals = np.ascontiguousarray(normals, np.float32)

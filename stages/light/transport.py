@@ -46,7 +46,7 @@ from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
 from stages.light.terms import GLTF, Terms
-from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts, mirror
+from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts, mirror, settle
 
 TILE = 512
 """Points a thread takes at once: their rays stay in its cache."""
@@ -111,6 +111,13 @@ class Sums:
     variance: NDArray[np.float32]
     rays: NDArray[np.float32]
 
+    def of_lights(self, count: int) -> "Sums":
+        """Without the channels that no light uses: averaging takes as long as there are channels."""
+        if count == MAX_LIGHTS:
+            return self
+        mean, noise = (np.ascontiguousarray(values[:, :, : 3 * count]) for values in (self.mean, self.variance))
+        return Sums(mean, noise, self.rays)
+
 
 def light_transport(
     scene: Scene, points: GBuffer, environments: list[Environment], quality: Quality, seed: int
@@ -146,7 +153,7 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
     """`light_transport` for lights that are already split."""
     near = reconstruction.Neighbours.of(points)
-    sums = gather(scene, points, lights, quality, seed, near)
+    sums = gather(scene, points, lights, quality, seed, near).of_lights(len(lights.environments))
     mean = smoothed(sums, points, lights, near) if quality.smooth else sums.mean
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
     return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
@@ -185,7 +192,7 @@ def smoothed(
     if not terms.highlights:
         return reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
     places = terms.places_of_highlights()
-    shown = highlights.open_highlights(points, lights.lamps, terms.alphas[list(terms.highlights)])
+    shown = highlights.open_highlights(points, lights.lamps, terms.alphas[list(terms.highlights)], sums.mean.shape[2])
     kept = highlights.take_out(sums.mean, sums.variance, shown, places, near)
     result = reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
     highlights.put_back(result, sums.mean, kept, places)
@@ -249,11 +256,11 @@ def _tile(
     gap: NDArray,
 ) -> None:
     """The sums of a tile's points, written to rows `part` of `mean` and `gap`."""
-    n, wo, origin, cells = points.n[part], points.wo[part], points.origin[part], lights.cells
+    n, wo, cells = points.n[part], points.wo[part], lights.cells
     frame, alphas = (n, *tangent_frame(n)), terms.alphas
     chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
     aim(n, wo, wanted[part], AIM, (cells.direction, cells.radius, cells.energy, cells.first), chosen, aimed)
-    drawn = rays.draw(frame, wo, origin, pixel, alphas, lights, chosen)
+    drawn = rays.draw(frame, wo, starts(points, part), pixel, alphas, lights, chosen)
     occluded = scene.occluded(drawn.origin, drawn.direction)
     excess = (lights.fine, lights.block, lights.texels.radiance, rays.density, cells.number, aimed)
     seen = (lights.pyramid, lights.level_start, *excess)
@@ -264,6 +271,11 @@ def _tile(
     weights = np.stack(terms.mirror_weights((n * wo).sum(-1).astype(np.float64).clip(0, 1)))
     for e, environment in enumerate(lights.environments):
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
+
+
+def starts(points: GBuffer, part: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Where rays of some points leave the smooth surface, and the triangle, and its normal."""
+    return points.origin[part], points.surface(part), points.ng[part]
 
 
 def tiles(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -320,13 +332,13 @@ class Rays:
         self,
         frame: tuple[NDArray, NDArray, NDArray],
         wo: NDArray,
-        origin: NDArray,
+        start: tuple[NDArray, NDArray, NDArray],
         pixel: NDArray,
         alphas: NDArray,
         lights: LightSet,
         chosen: NDArray,
     ) -> "Drawn":
-        """The rays of a tile's points, R in all."""
+        """The rays of a tile's points, R in all. Args: start: of `starts`."""
         count, slots = len(wo), len(self.slots)
         most = count * slots
         origins, directions = np.empty((2, most, 3), np.float32)
@@ -334,7 +346,8 @@ class Rays:
         rays = Drawn(origins, directions, texel, density, np.empty((count, slots), np.int32))
         excess = (lights.texels, lights.cells.begin, lights.cells.first)
         samples = (self.slots, self.shift, self.turn, self.jitter, self.seed)
-        used = draw(*frame, wo, origin, pixel, samples, alphas, excess, chosen, rays)
+        used = draw(*frame, wo, start[0], pixel, samples, alphas, excess, chosen, rays)
+        settle(origins, directions, rays.row, *start[1:])
         return Drawn(origins[:used], directions[:used], texel[:used], density[:used], rays.row)
 
 

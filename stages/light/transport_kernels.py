@@ -21,6 +21,11 @@ CELL_SHIFT = int(math.log2(FINE // CELLS))
 WEIGHT = CHANNELS - 1
 """The channel, no light's, that holds 1 for every lobe ray: its sums are those of the weights."""
 
+GRAZING = 0.1
+"""Cosine of a ray to its own triangle's normal from which on it starts from that triangle. Flatter ones start from the smooth
+surface that is meant, or facets would throw shadows on each other; were all to start there, the shadows of other things would
+move. Blender's default (Shadow Terminator: Geometry Offset)."""
+
 LANES = 16
 """Rays are weighed in multiples of this many, so that a vector unit has no odd ones left over."""
 
@@ -180,6 +185,24 @@ def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # 
             row[p, s] = used
             used += 1
     return used
+
+
+@fast
+def settle(origin, direction, row, surface, ng):  # type: ignore[no-untyped-def]
+    """Move the starts of rays from the smooth surface to the triangle, by their angle to it, in place.
+
+    Args:
+        origin, direction: (R, 3). row: (P, S) of a `Drawn`. surface, ng: (P, 3), where rays leave the triangle, and its normal.
+    """
+    for p in range(len(row)):
+        for s in range(row.shape[1]):
+            r = row[p, s]
+            if r < 0:
+                continue
+            cosine = direction[r, 0] * ng[p, 0] + direction[r, 1] * ng[p, 1] + direction[r, 2] * ng[p, 2]
+            lifted = np.float32(1) - min(max(cosine * np.float32(1 / GRAZING), np.float32(0)), np.float32(1))
+            for d in range(3):
+                origin[r, d] = surface[p, d] + lifted * (origin[r, d] - surface[p, d])
 
 
 @fast

@@ -71,6 +71,16 @@ class TransferReportOptions:
 
 
 @dataclass(frozen=True)
+class PreviewReportOptions:
+    """Options of the report on an asset's preview."""
+
+    cycles: str = ""
+    """a Python interpreter that has the package bpy (Blender); empty for no side-by-side"""
+    three: str = ""
+    """a folder of node modules that has three, for a side-by-side in Chromium; empty for none"""
+
+
+@dataclass(frozen=True)
 class DistillReportOptions:
     """Options of the report on a step with Stable Diffusion."""
 

@@ -12,7 +12,6 @@ from stages.asset.maps import Maps
 from stages.asset.textures import normal_8bit, srgb_8bit
 from stages.bake import stage
 from stages.bake.options import BakeOptions
-from stages.bake.preview import bilinear
 from stages.bake.stage import bake
 from stages.core.artifact import read_exr, read_manifest, sha256_file
 from stages.core.color import srgb_encode
@@ -65,7 +64,7 @@ def test_all_files_are_there_and_the_manifest_knows_their_hashes(constant_asset:
     folder = constant_asset / "asset"
     provenance, files = read_manifest(folder, ASSET)
     obj = {"roughness.png", "metallic.png", "model.obj", "model.mtl"}
-    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png", "report.html"}
+    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png", "preview.json", "preview_light.exr", "report.html"}
     assert all(sha256_file(folder / name) == digest for name, digest in files.items())
     assert {path.name for path in folder.iterdir()} == {*files, "bake.json", "run.json"}
     assert provenance.inputs["prep"] == sha256_file(constant_asset / "prep.npz")
@@ -291,12 +290,6 @@ def test_srgb_bytes_are_the_rounded_curve() -> None:
     linear = np.concatenate([np.linspace(0, 1, 100_003), [-1, 2]]).astype("f4")
     exact = srgb_encode(linear.astype(float)) * 255
     assert np.abs(srgb_8bit(linear) - exact).max() <= 0.5 + 1e-4
-
-
-def test_bilinear_look_up_at_centres_between_them_and_beyond() -> None:
-    maps = np.array([[[0.0], [1.0]], [[2.0], [3.0]]], "f4")  # v is up: the first row is at v = 0.75
-    uv = np.array([[0.25, 0.75], [0.75, 0.25], [0.5, 0.5], [-1, 2], [0.5, 0.75]], "f4")
-    np.testing.assert_allclose(bilinear(maps, uv)[:, 0], [0, 3, 1.5, 0, 0.5], atol=1e-6)
 
 
 def test_the_report_says_what_the_asset_is(constant_asset: Path) -> None:

@@ -6,7 +6,8 @@ from numpy.typing import NDArray
 from stages.core.albedo import MIN_COSINE
 from stages.core.frames import look_at
 from stages.light.gbuffer import trace_view
-from stages.light.normal_maps import CLAMP, MIRROR, REPEAT, NormalMap, NormalMaps
+from stages.light.lookup import CLAMP, MIRROR, REPEAT
+from stages.light.normal_maps import NormalMap, NormalMaps
 from stages.light.scene import Scene
 
 LEANING = np.array([0.48, 0.6, 0.64])

@@ -1,0 +1,142 @@
+"""The preview: clean light, filtered textures, and cameras and light that others can repeat."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from stages.bake import preview
+from stages.bake.preview import Look, draw_view, footprint, rougher
+from stages.bake.studio import FOV_Y, camera, cameras, write_studio
+from stages.core.artifact import load_npz
+from stages.core.color import srgb_encode
+from stages.core.frames import Y_UP_TO_WORLD, Z_UP_TO_WORLD, camera_rays, project
+from stages.core.schemas import PREP
+from stages.light.environment import load_environment, lookup
+from stages.light.gbuffer import surface_points
+from stages.light.lights import preview_light
+from stages.light.normal_maps import NormalMap, NormalMaps
+from stages.light.scene import Scene
+from stages.light.transport import Quality
+from tests.bake.examples import cube, save_prep
+from tests.light import scenes
+
+
+def sheet(bumps: NormalMaps | None = None) -> Scene:
+    """The square |x|, |y| <= 1/2 at z = 0."""
+    vertices = np.array([[-0.5, -0.5, 0], [0.5, -0.5, 0], [0.5, 0.5, 0], [-0.5, 0.5, 0]], "f4")
+    normals = np.broadcast_to(np.array([0, 0, 1], "f4"), (2, 3, 3))
+    return Scene(vertices, np.array([[0, 1, 2], [0, 2, 3]], "i4"), normals, bumps)
+
+
+def sheet_uv(scene: Scene) -> np.ndarray:
+    return (scene.vertices[scene.triangles][..., :2] * (1, -1) + 0.5).astype("f4")
+
+
+def test_a_footprint_is_what_the_next_ray_hits() -> None:
+    """On a plane seen at a slant the edge of a patch leads to the neighbouring pixel's hit."""
+    scene, size = sheet(), 64
+    c2w = camera(scene.vertices.astype(float), 30, 50)
+    directions = camera_rays(c2w, FOV_Y, size, size)[1]
+    hits = scene.intersect(np.broadcast_to(c2w[:3, 3], directions.shape), directions)
+    mask = hits.mask.reshape(size, size)
+    points = surface_points(scene, hits, directions, mask)
+    across = footprint(scene, points, directions[hits.mask], c2w, 2 * np.tan(FOV_Y / 2) / size)
+    corners = scene.vertices[scene.triangles[points.triangle]]
+    assert across.sum(2) == pytest.approx(0, abs=1e-6)
+    moved = np.einsum("pek,pkd->ped", across, corners)
+    index = np.full(mask.shape, -1)
+    index[mask] = np.arange(mask.sum())
+    right = np.argwhere((index[:, :-1] >= 0) & (index[:, 1:] >= 0))
+    here, there = index[right[:, 0], right[:, 1]], index[right[:, 0], right[:, 1] + 1]
+    step = points.point[there] - points.point[here]
+    assert np.abs(moved[here, 0] - step).max() < 0.03 * np.linalg.norm(step, axis=1).mean()
+
+
+def test_detail_of_one_texel_does_not_flicker() -> None:
+    """A checkerboard of single texels in a small picture is even grey."""
+    scene = sheet()
+    maps = np.zeros((512, 512, 5), "f4")
+    maps[..., :3] = (np.indices((512, 512)).sum(0) % 2)[..., None]
+    picture = draw_view(Look(scene, sheet_uv(scene), maps), preview_light(), camera(scene.vertices.astype(float), 20, 60), 24)
+    inside = picture.alpha & np.roll(picture.alpha, 1, 0) & np.roll(picture.alpha, -1, 0)
+    assert picture.material[inside, 0] == pytest.approx(0.5, abs=0.05)
+
+
+def test_light_has_no_dots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ball beside one drawn with thirty times the rays: no pixel stands out, and on the whole they agree."""
+    ball = scenes.sphere(4)
+    look = Look(ball, np.full((len(ball.triangles), 3, 2), 0.5, "f4"), np.full((2, 2, 5), 0.5, "f4"))
+    view, size = camera(ball.vertices.astype(float), 45, 18), 40
+    shown = srgb_encode(draw_view(look, preview_light(), view, size).over(np.zeros(3, "f4")))
+    monkeypatch.setattr(preview, "RAYS", Quality(lobe=700, light=250, extra=False))
+    exact = srgb_encode(draw_view(look, preview_light(), view, size).over(np.zeros(3, "f4")))
+    assert np.sqrt(np.square(shown - exact).mean()) < 1.2 / 255
+    assert np.abs(shown - exact).max() < 8 / 255
+
+
+def test_bumps_too_fine_to_see_make_the_surface_rougher() -> None:
+    """A map of opposite slopes: the mean normal is straight, and what the slopes scattered goes into the roughness."""
+    slopes = np.zeros((512, 512, 3), "f4")
+    slopes[..., 0] = 0.3 * np.where(np.arange(512) % 2, 1, -1)
+    slopes[..., 2] = np.sqrt(1 - 0.09)
+    scene = sheet()
+    uv, frames = sheet_uv(scene), np.broadcast_to(np.array([1, 0, 0, 1], "f4"), (2, 3, 4))
+    bumps = NormalMaps([NormalMap(slopes)], np.zeros(2, "i4"), uv, frames)
+    weights = np.full((1, 3), 1 / 3, "f4")
+    across = np.array([[[-0.1, 0.1, 0], [0, -0.1, 0.1]]])
+    n, length = bumps.filtered(np.array([[0, 0, 1.0]]), np.zeros(1, int), weights, across)
+    assert n[0] == pytest.approx([0, 0, 1], abs=0.02)
+    assert length[0] == pytest.approx(np.sqrt(1 - 0.09), abs=0.01)
+    assert rougher(np.float32([0.2, 0.2]), np.float32([0, 0.05])) == pytest.approx([0.2, 0.1016**0.25], rel=1e-4)
+    look = Look(scene.bumped(bumps), uv, np.full((2, 2, 5), 0.5, "f4"))
+    flat, bumpy = (draw_view(one, preview_light(), camera(scene.vertices.astype(float), 125, 28), 16).color
+                   for one in (replace(look, scene=scene), look))  # fmt: skip
+    assert bumpy.max() < 0.9 * flat.max()  # the mirrored sun is spread out
+
+
+@pytest.mark.parametrize("up", (Y_UP_TO_WORLD, Z_UP_TO_WORLD))
+def test_cameras_see_the_model_where_the_picture_shows_it(tmp_path: Path, up: np.ndarray) -> None:
+    """The corners of a turned, scaled source, brought to glTF's frame, lie in preview.json's view as ours in our own."""
+    move = up.copy()
+    move[:3, :3] *= 0.25
+    move[:3, 3] = (0.1, -0.2, 0.05)
+    mesh = load_npz(save_prep(tmp_path / "prep.npz", cube().with_(to_world=move)), PREP)
+    assert write_studio(tmp_path, mesh, 64) == ["preview.json", "preview_light.exr"]
+    said = json.loads((tmp_path / "preview.json").read_text())
+    to_gltf = np.eye(4)
+    to_gltf[:3, :3] = Y_UP_TO_WORLD[:3, :3].T @ up[:3, :3]
+    model = trimesh.transform_points(mesh["source_vertices"], to_gltf)
+    for given, own in zip(said["views"], cameras(mesh["vertices"], mesh["triangles"]), strict=True):
+        c2w = np.array(given["c2w"])
+        assert c2w[:3, :3] @ c2w[:3, :3].T == pytest.approx(np.eye(3), abs=1e-9)
+        ours, _ = project(mesh["vertices"], own, FOV_Y, 64, 64)
+        assert project(model, c2w, said["fov_y"], 64, 64)[0] == pytest.approx(ours, abs=1e-3)
+
+
+def test_the_light_is_turned_as_three_and_blender_read_it(tmp_path: Path) -> None:
+    """Its middle column lies towards glTF's +x, and u grows from +x to +z."""
+    mesh = load_npz(save_prep(tmp_path / "prep.npz", cube()), PREP)
+    write_studio(tmp_path, mesh, 64)
+    read = load_environment(tmp_path / "preview_light.exr")[0].radiance
+    world = np.random.default_rng(0).normal(size=(200, 3))
+    world /= np.linalg.norm(world, axis=1, keepdims=True)
+    x, y, z = (world @ Y_UP_TO_WORLD[:3, :3]).T  # glTF's
+    column = (np.arctan2(z, x) / (2 * np.pi) + 0.5) * read.shape[1]
+    row = np.arccos(y) / np.pi * read.shape[0]
+    nearest = read[np.clip(row.astype(int), 0, len(read) - 1), column.astype(int) % read.shape[1]]
+    assert nearest == pytest.approx(lookup(preview_light().radiance, world), rel=0.2, abs=0.05)
+
+
+def test_a_large_picture_is_drawn_in_tiles_without_seams(monkeypatch: pytest.MonkeyPatch) -> None:
+    ball = scenes.sphere(3)
+    look = Look(ball, np.full((len(ball.triangles), 3, 2), 0.5, "f4"), np.full((2, 2, 5), 0.5, "f4"))
+    view = camera(ball.vertices.astype(float), 45, 18)
+    whole = draw_view(look, preview_light(), view, 40)
+    monkeypatch.setattr(preview, "TILE", 32)
+    cut = draw_view(look, preview_light(), view, 40)
+    assert (whole.alpha == cut.alpha).all()
+    assert np.abs(srgb_encode(whole.over(np.zeros(3, "f4"))) - srgb_encode(cut.over(np.zeros(3, "f4")))).max() < 8 / 255
