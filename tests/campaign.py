@@ -11,6 +11,7 @@ imported everything, which saves two seconds; every eighth of these in a process
 
 import argparse
 import contextlib
+import json
 import os
 import random
 import resource
@@ -28,11 +29,11 @@ from unittest.mock import patch
 
 import numpy as np
 
-from stages.bake.stage import material_field
 from stages.core.artifact import load_npz, read_exr
 from stages.core.errors import ArtifactError
 from stages.core.schemas import MATERIAL, PREP
 from stages.distill.views import Views
+from stages.material.learnt import LearntMaterial
 from tests import damages
 from tests.pipeline import cube_sphere, fingerprint
 from tests.pipeline import stages as commands
@@ -263,8 +264,10 @@ def what_is_read(folder: Path, command: str) -> dict[str, bytes]:
         return surfaces | {f"{key}": views.read_transport(key).packed().numpy().tobytes() for key in keys}
     if command == "bake":
         made = load_npz(folder / "material.npz", MATERIAL)
-        field = material_field(folder / "material.npz", made)
-        return {name: array.tobytes() for name, array in field.to_arrays().items()}
+        learnt = LearntMaterial.of(folder / "material.npz", made)
+        survey, residual = learnt.lookup.survey.to_arrays(), learnt.residual.to_arrays()
+        known = {name: array.tobytes() for name, array in {**survey, **residual}.items()}
+        return known | {"recipe": json.dumps(learnt.recipe.to_json()).encode()}
     return {name: array.tobytes() for name, array in mesh.arrays.items()}
 
 

@@ -36,7 +36,7 @@ def test_real_mesh_through_all_stages(mesh: Path, tmp_path: Path) -> None:
     few = ConditionsOptions(views=3, size=48, env=("overcast", "studio"), quality="draft")
     conditions(prepared, folder, few)
     distill(folder, material, DistillOptions(prompt="worn red plastic", steps=4))
-    bake(prepared, material, asset, BakeOptions(size=512, supersample=1, preview_size=48))
+    bake(prepared, material, asset, BakeOptions(size=512, supersample=1, preview_size=32, occlusion_rays=8))
 
     made = load_npz(prepared, PREP)
     assert np.ptp(made["vertices"], axis=0).max() == pytest.approx(1, abs=1e-4)

@@ -17,6 +17,9 @@ from stages.material.surface import Array, Surface
 COLUMNS = 6
 """Red, green and blue of the linear albedo, roughness, metallic, height in object sizes."""
 
+DARKEST = 0.004
+"""Least albedo of a channel: soot's. Colours that words name may lie outside of what any surface has."""
+
 SAMPLES = 96
 """Edge of the square of samples from which a look's means are told."""
 
@@ -128,8 +131,8 @@ def turned(found: Look, coat: Coat) -> Look:
         roughness = coat.roughness + (roughness - mean.roughness) * np.float32(spread)
     if coat.metallic is not None:
         metallic = metallic + np.float32(coat.metallic - mean.metallic)
-    color, roughness, metallic = (np.clip(a, 0, 1) for a in (color, roughness, metallic))
-    return Look(color, roughness, metallic, found.height, found.dye)
+    roughness, metallic = (np.clip(a, 0, 1) for a in (roughness, metallic))
+    return Look(np.clip(color, DARKEST, 1), roughness, metallic, found.height, found.dye)
 
 
 def recolored(color: Array, mean: Array, coat: Coat) -> Array:

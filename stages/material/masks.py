@@ -112,7 +112,8 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
     """The recipe with each mask's level set so that it covers its share of this surface. Args: surface: evenly spread
     points."""
     uv, face = along(pieces, surface.piece, surface.point, surface.normal)
-    world = Place(np.ascontiguousarray(surface.point.T), uv, face, surface.footprint, seed=recipe.seed)
+    all_seen = np.full(len(surface), np.float32(1e-4))  # a level is that of the whole noise
+    world = Place(np.ascontiguousarray(surface.point.T), uv, face, all_seen, seed=recipe.seed)
 
     def settle(mask: Mask, place: Place) -> Mask:
         if mask.kind == "all" or mask.level is not None:

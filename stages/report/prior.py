@@ -198,7 +198,7 @@ def carry_out(run: Run, out: Path, options: PriorReportOptions) -> Baked:
     if run.alone:
         asked = dataclasses.replace(asked, anchor=0.0)
     distill(source / "conditions", folder / "material.npz", asked)
-    bake(source / "prep.npz", folder / "material.npz", folder / "asset", BakeOptions(TEXTURE, 1, PREVIEW))
+    bake(source / "prep.npz", folder / "material.npz", folder / "asset", BakeOptions(TEXTURE, 1, PREVIEW, occlusion_rays=1))
     return read_baked(source / "prep.npz", folder / "material.npz", folder / "asset")
 
 

@@ -23,7 +23,7 @@ def assets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     save_prep(folder / "prep.npz", cube())
     for name, values in (("left", LEFT), ("right", RIGHT)):
         save_material(folder / f"{name}.npz", folder / "prep.npz", constant(values))
-        bake(folder / "prep.npz", folder / f"{name}.npz", folder / name, BakeOptions(512, 1, 64))
+        bake(folder / "prep.npz", folder / f"{name}.npz", folder / name, BakeOptions(512, 1, 64, 8))
     return folder
 
 

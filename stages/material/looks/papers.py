@@ -135,7 +135,7 @@ def corrugated_cardboard(at: Place) -> Look:
     shown = fading(pitch / 2, at.footprint)
     wave = np.cos(np.pi * flute) * shown * (1 - 0.6 * dent)
     crease = cracks(bent, 0.03, 0.0005, 0.2, 14, 2, 0.05, (2.2, 0.6, 1)).cover
-    color = shade(color, 0.30 * wave + 0.04 * fine - 0.12 * dent - 0.15 * crease - 0.02 * shown)
+    color = shade(color, 0.22 * wave + 0.07 * fine - 0.12 * dent - 0.15 * crease - 0.02 * shown)
     return Look(
         color,
         np.clip(0.88 + 0.04 * fine - 0.05 * wave, 0, 1),
