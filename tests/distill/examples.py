@@ -82,7 +82,8 @@ def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str 
         if profile == SD:
             towards = np.where(geometry.mask[..., None], np.array([0.0, 0, 1]), 0).astype(np.float32)
             write_geometry(folder, view, dataclasses.replace(geometry, normal=towards), SD)
-        files += [f"{view_folder(view)}/{name}.exr" for name in ("geometry", *LIGHTS)]
+        folders = [view_folder(view), *([f"{view_folder(view)}/{SD}"] if profile == SD else [])]
+        files += [f"{place}/{name}.exr" for place in folders for name in ("geometry", *LIGHTS)]
     extra = {"environments": list(LIGHTS), "views": views, "knots": list(KNOTS), "clamped": {}, "to_world": identity()}
     extra["profile"] = profile
     write_manifest(folder, CONDITIONS, Provenance(made.options, 0, made.inputs, extra), files)
