@@ -13,7 +13,7 @@ class BakeOptions:
     """How textures are baked."""
 
     size: int = 2048  # texels along each edge, one of SIZES
-    supersample: int = 2  # field samples along each edge of a texel, averaged: 2 means 4 samples
+    supersample: int = 1  # samples along each edge of a texel, averaged; a recipe holds nothing finer than one asks for
     preview_size: int = 320  # pixels along each edge of one view of preview.png
     occlusion_rays: int = 128  # of each point whose ambient occlusion is traced
 
