@@ -49,8 +49,7 @@ def preview(maps: Maps, size: int) -> NDArray[np.float32]:
     cached_light_set(tuple(lights))  # once, not in every thread
     rows = in_parallel(lambda thing: _pictures(thing, lights, material, normal, size), (sphere(), plate()))
     albedo = srgb_encode(shrunk(maps.albedo, size))
-    half = albedo[::2, ::2] if size % 2 == 0 else albedo
-    repeated = np.tile(srgb_encode(shrunk(maps.albedo, len(half))), (2, 2, 1))[:size, :size]
+    repeated = np.tile(srgb_encode(shrunk(maps.albedo, -(-size // 2))), (2, 2, 1))[:size, :size]
     close = srgb_encode(maps.albedo[:size, :size]) if len(maps.albedo) >= size else albedo
     rough = np.repeat(shrunk(maps.material[..., 3:4], size), 3, 2)
     last = [repeated, close, rough]
