@@ -14,7 +14,7 @@ from stages.core.artifact import Field, Provenance, Schema, load_npz, save_npz, 
 from stages.core.errors import ArtifactError
 from stages.prior import profile
 from stages.prior.network import Denoiser
-from stages.prior.text import WEIGHTS_FOLDER, Reader, Reading, TextEmbedding, TextEncoder, Vocabulary
+from stages.prior.text import WEIGHTS_FOLDER, Reader, TextEmbedding, TextEncoder, Vocabulary
 
 WEIGHTS = Schema("dreammat.prior", 1, {"parameters": Field("f2", ("N",))}, extra=("layout", "training"))
 """All parameters in one row, in the order of `layout`: [name, shape] each. training: what they came from."""
@@ -27,7 +27,7 @@ VOCABULARY_FILE = WEIGHTS_FOLDER / "vocabulary.npz"
 
 
 class PriorNetwork(nn.Module):
-    """Everything that is trained: the denoiser with its text encoder, and the reader, which knows materials by words alone."""
+    """Everything that is trained: the denoiser with its text encoder, and the reader of words that no table knows."""
 
     def __init__(self, dims: int) -> None:
         super().__init__()
@@ -79,8 +79,8 @@ class Prior:
         with torch.no_grad():
             return self.network.text(vectors.to(self.device), present.to(self.device))
 
-    def read(self, prompts: list[str]) -> Reading:
-        """What the words of B prompts call for."""
+    def read(self, prompts: list[str]) -> Tensor:
+        """The material that the words of B prompts call for: sRGB albedo, roughness and metallic, (B, 5)."""
         vectors, present = (t.to(self.device) for t in self.vocabulary.encode(prompts))
         with torch.no_grad():
             return self.network.reader.read(vectors, present)

@@ -7,15 +7,16 @@ from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
+from torch import Tensor
 
 from stages.core.color import srgb_decode
 from stages.material.look import to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
-from stages.prior.model import Prior
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Join, Phrase, split
@@ -39,6 +40,7 @@ from stages.prior.places import (
 )  # fmt: skip
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
 from stages.prior.stuffs import BOARDS, FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
+from stages.prior.text import Vocabulary
 
 RGB = tuple[float, float, float]
 
@@ -55,7 +57,17 @@ UNSAID = "plaster"
 """What a thing is taken to be made of where neither words nor tables say."""
 
 
-def read_prompt(prompt: str, prior: Prior, seed: int, metres: float | None = None) -> Recipe:
+class Words(Protocol):
+    """What knows words: a `Prior`."""
+
+    @property
+    def vocabulary(self) -> Vocabulary: ...
+
+    def read(self, prompts: list[str]) -> Tensor:
+        """Mean sRGB albedo, roughness and metallic of B prompts, (B, 5)."""
+
+
+def read_prompt(prompt: str, prior: Words, seed: int, metres: float | None = None) -> Recipe:
     """What the words of a prompt call for. Args: metres: longest edge of the object, where it is known."""
     return Reading(prior, metres).recipe(prompt, seed)
 
@@ -63,7 +75,7 @@ def read_prompt(prompt: str, prior: Prior, seed: int, metres: float | None = Non
 class Reading:
     """One reading of a prompt. Args: as `read_prompt`; looks: names of those that there are."""
 
-    def __init__(self, prior: Prior, metres: float | None = None, looks: Collection[str] = LOOKS) -> None:
+    def __init__(self, prior: Words, metres: float | None = None, looks: Collection[str] = LOOKS) -> None:
         self._prior, self._metres, self._looks = prior, metres, looks
 
     def recipe(self, prompt: str, seed: int) -> Recipe:
@@ -199,7 +211,7 @@ class Reading:
             wanted = stuff(kind, bool(phrase.colors))
             return self._of(wanted._replace(look=own or wanted.look), replace(phrase, unknown=[]), " ".join(phrase.unknown))
         words = " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance]).strip()
-        *color, roughness, metallic = self._prior.read([words]).coats[0, 0].tolist()
+        *color, roughness, metallic = self._prior.read([words])[0].tolist()
         near = stuff(self._nearest(phrase, metallic > 0.5), False)
         means = {"color": _triple(np.array(color)), "roughness": roughness, "metallic": float(metallic > 0.5)}
         return self._of(near._replace(look=own or near.look, paintable=True, **means), phrase)

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from stages.core.artifact import Field, Schema, load_npz
-from stages.prior.patterns import PATTERNS
-from stages.prior.recipe import LAYOUTS
 
 VOCABULARY = Schema(
     "dreammat.vocabulary",
@@ -184,34 +182,16 @@ class TextEncoder(nn.Module):
         return TextEmbedding(x, present, x[:, 0])
 
 
-@dataclass(frozen=True)
-class Reading:
-    """What B prompts call for, on average over all that they fit: a base coat, and one that lies on it, if any does.
-
-    coats: (B, 2, 5) in (0, 1), sRGB albedo (3), roughness, metallic. spread: (B, 2, 2) in (0, 1), how far a coat's pattern
-    moves sRGB and roughness. pattern: (B, 2, PATTERNS) logits. layout: (B, LAYOUTS) logits.
-    """
-
-    coats: Tensor
-    spread: Tensor
-    pattern: Tensor
-    layout: Tensor
-
-
 class Reader(TextEncoder):
-    """Reads a prompt as a base coat, a second one, and how that one lies on it: "oak base and gold top"."""
+    """Reads words as a material on average: what is asked where no table knows a word."""
 
     def __init__(self, dims: int = 64, width: int = 128) -> None:
         super().__init__(dims, width, roots=3)
-        self.coat = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 7))
-        self.pattern, self.layout = nn.Linear(width, len(PATTERNS)), nn.Linear(width, len(LAYOUTS))
+        self.coat = nn.Sequential(nn.Linear(width, width), nn.SiLU(), nn.Linear(width, 5))
 
-    def read(self, vectors: Tensor, present: Tensor) -> Reading:
-        """Args: as `Vocabulary.encode` returns them."""
-        base, second, whole = self(vectors, present).tokens[:, :3].unbind(1)
-        coats = torch.stack([base, second], 1)
-        mean, spread = torch.sigmoid(self.coat(coats)).split([5, 2], -1)
-        return Reading(mean, spread, self.pattern(coats), self.layout(whole))
+    def read(self, vectors: Tensor, present: Tensor) -> Tensor:
+        """sRGB albedo, roughness and metallic in (0, 1), (B, 5). Args: as `Vocabulary.encode` returns them."""
+        return torch.sigmoid(self.coat(self(vectors, present).pooled))
 
 
 class TextBlock(nn.Module):

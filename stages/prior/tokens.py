@@ -15,8 +15,9 @@ from stages.prior.sizes import TIMES
 from stages.prior.stuffs import FINISH_LOOKS, KNOWN, LOOK_OF
 
 FILLER = words(
-    "a photo of, a photograph of, a 3d render of, a rendering of, a picture of, an image of, a model of, highly detailed, "
-    "detailed texture, detailed, realistic, photorealistic, studio lighting, physically based, pbr, k, texture, material, "
+    "a photo of, a photograph of, a d render of, d render of, render of, a rendering of, a picture of, an image of, "
+    "a model of, highly detailed, detailed texture, detailed, realistic, photorealistic, studio lighting, "
+    "physically based, pbr, k, texture, material, "
     "surface, front view, side view, back view, top view, overhead view, high quality, masterpiece, beautiful, made of, "
     "made from, made out of, made in, carved from, carved out of, cut from, built of, built from, a, an, the, is, are, at, "
     "its, some, very, all, from, entirely, completely, slightly, heavily, partly, partially, fully, looks like, made, of it, "

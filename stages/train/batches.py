@@ -1,6 +1,6 @@
 """Batches for training: stored transport, mixed and tinted, shaded with fresh materials.
 
-A batch is a function of seed and step alone, so a resumed run sees what an uninterrupted one would have seen.
+A batch is a function of tiles, seed and step alone, so a resumed run sees what an uninterrupted one would have seen.
 """
 
 from dataclasses import dataclass
@@ -14,11 +14,13 @@ from torch import Tensor
 
 from stages.core.artifact import load_npz
 from stages.core.shading import KNOTS, Material, Transport, light_maps, shade
-from stages.prior.patterns import PATTERNS
+from stages.material.directions import Pieces
+from stages.material.evaluate import evaluate
+from stages.material.masks import settled
+from stages.material.surface import Surface
 from stages.prior.profile import SIZE, exposure, prepare, profile_tone
-from stages.prior.recipe import LAYOUTS, Surface
-from stages.train.materials import encoded, random_material, stand_in
-from stages.train.render import SHARD
+from stages.train.materials import encoded, random_coat, random_material
+from stages.train.render import SHARD, SURFACE
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,10 @@ class Batch:
 
 @dataclass(frozen=True)
 class Tile:
-    """One stored picture: where the object is, its surface and its transport under each light (P, L, 19, 3) float16."""
+    """One stored picture: where the object is, its surface and its transport under each light (P, L, 19, 3) float16.
+
+    even: points spread evenly over the whole shape. pieces: of it.
+    """
 
     mask: NDArray[np.bool_]
     depth: NDArray[np.float32]
@@ -46,6 +51,8 @@ class Tile:
     surface: Surface
     transport: NDArray[np.float16]
     cosine: NDArray[np.float32]
+    even: Surface
+    pieces: Pieces
 
 
 class Tiles:
@@ -60,11 +67,13 @@ class Tiles:
 
     def __getitem__(self, index: int) -> Tile:
         shard, tile = self.shards[self.where[index][0]], self.where[index][1]
-        part = slice(shard["start"][tile], shard["start"][tile + 1])
-        surface = Surface(*(shard[name][part] for name in ("point", "normal", "convexity", "occlusion")))
+        part, shape = slice(shard["start"][tile], shard["start"][tile + 1]), shard["shape"][tile]
+        surface = Surface(*(shard[name][part] for name in SURFACE))
+        even = Surface(*(shard[f"even_{name}"][shape] for name in SURFACE))
+        pieces = Pieces(*(shard[f"pieces_{name}"][shard["pieces_shape"] == shape] for name in Pieces._fields))
         normal = surface.normal @ shard["to_view"][tile].T
         light = shard["transport"][part], shard["cosine"][part]
-        return Tile(shard["mask"][tile], shard["depth"][tile], normal, surface, *light)
+        return Tile(shard["mask"][tile], shard["depth"][tile], normal, surface, *light, even, pieces)
 
 
 class PictureBatches(torch.utils.data.Dataset):
@@ -80,52 +89,25 @@ class PictureBatches(torch.utils.data.Dataset):
         return assemble(list(captions), torch.from_numpy(np.stack(images)), rng)
 
 
-PATTERN_NAMES = list(PATTERNS)
-
-POINTS = 12
-"""Points of a material that stand for it where the reader learns."""
-
-
-COMPOSED = 0.7
-"""Share of compositions there: what goes where is harder to learn than what it is."""
-
-
 @dataclass(frozen=True)
 class CaptionBatch:
-    """B captions and what they call for.
-
-    coats: (B, 2, 5), mean material of each coat. spread: (B, 2, 2), how far its pattern moves sRGB and roughness. pattern:
-    (B, 2), its number in `PATTERNS`. layout: (B,), its number in `LAYOUTS`. All are 0 for a second coat that is not there.
-    """
+    """B phrases and the material that each calls for: sRGB albedo, roughness and metallic, (B, 5)."""
 
     captions: list[str]
     coats: Tensor
-    spread: Tensor
-    pattern: Tensor
-    layout: Tensor
 
 
 class CaptionBatches(torch.utils.data.Dataset):
-    """Captions and what they call for; batch number `step` of a run."""
+    """Phrases of one substance and what they call for; batch number `step` of a run."""
 
     def __init__(self, size: int, seed: int) -> None:
         self.size, self.seed = size, seed
 
     def __getitem__(self, step: int) -> CaptionBatch:
         rng = default_rng([self.seed, 2, step])
-        coats, spread = np.zeros((self.size, 2, 5), np.float32), np.zeros((self.size, 2, 2), np.float32)
-        pattern, layout = np.zeros((self.size, 2), np.int64), np.zeros(self.size, np.int64)
-        captions = []
-        for i in range(self.size):
-            material, surface = random_material(rng, COMPOSED), stand_in(rng, POINTS)
-            captions.append(material.caption)
-            for k, coat in enumerate(material.recipe.coats):
-                coats[i, k] = encoded(coat.evaluate(surface)).mean(0)
-                spread[i, k] = abs((coat.second - coat.color).mean()), coat.roughness_spread
-                pattern[i, k] = PATTERN_NAMES.index(coat.pattern)
-            if material.recipe.layout is not None:
-                layout[i] = LAYOUTS.index(material.recipe.layout.kind)
-        return CaptionBatch(captions, *map(torch.from_numpy, (coats, spread, pattern, layout)))
+        phrases, coats = zip(*(random_coat(rng) for _ in range(self.size)), strict=True)
+        means = [[*(coat.color or ()), coat.roughness, coat.metallic] for coat in coats]
+        return CaptionBatch(list(phrases), torch.tensor(means))
 
 
 CHANNELS = {"mask": 1, "depth": 1, "normal": 3, "height": 1, "lights": 18, "radiance": 3, "material": 5}
@@ -140,7 +122,8 @@ def picture(tile: Tile, rng: Generator) -> tuple[str, NDArray[np.float32]]:
     """
     transport = random_transport(tile.transport, tile.cosine, rng)
     material = random_material(rng)
-    values = material.recipe.evaluate(tile.surface)  # (P, 5)
+    recipe = settled(material.recipe, tile.even, tile.pieces)
+    values = np.ascontiguousarray(evaluate(recipe, tile.surface, tile.pieces)[:, :5])  # (P, 5)
     parameters = torch.from_numpy(values)
     radiance = shade(transport, Material.of(parameters))
     lights = light_maps(transport).reshape(len(values), 18).numpy()

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from stages.light.environment import Environment, directions_of_texels
 from stages.light.lights import disc, panel
-from stages.prior.patterns import fbm
+from stages.material.patterns import Spectrum, fbm
+from stages.material.place import Place
 
 HEIGHT = 128
 """Rows of a training light; 1.4 degrees a texel."""
@@ -96,7 +97,8 @@ def lamps(w: NDArray, rng: Generator, count: int) -> NDArray[np.float64]:
 
 def clutter(w: NDArray, rng: Generator) -> NDArray[np.float64]:
     """A factor with the look of surroundings: patches of light and dark, colours varying. Returns: (H, W, 3)."""
-    points = w.reshape(-1, 3) * rng.uniform(1.5, 6) + rng.uniform(0, 32, 3)
-    shade = np.exp(rng.uniform(0.8, 2.2) * fbm(points, 4)).reshape(*w.shape[:2], 1)
-    hue = np.exp(0.35 * np.stack([fbm(points * 0.7 + k * 5.5, 2) for k in range(3)], -1)).reshape(w.shape)
-    return shade * hue
+    p = np.ascontiguousarray((w.reshape(-1, 3) * rng.uniform(1.5, 6)).T, np.float32)
+    at = Place(p, p[:2], np.zeros(p.shape[1], np.int32), np.full(p.shape[1], 0.05, np.float32), seed=int(rng.integers(2**31)))
+    shade = np.exp(rng.uniform(0.4, 1.1) * fbm(at, Spectrum(1.0, 0.125, 0.5)))
+    hue = np.exp(0.17 * np.stack([fbm(at, Spectrum(1.4, 0.7, 0.5), k) for k in (1, 2, 3)], -1))
+    return (shade[:, None] * hue).reshape(w.shape)

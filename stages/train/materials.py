@@ -1,142 +1,87 @@
-"""Random materials with captions: a recipe, and words that say what it is."""
+"""Random materials with captions: a caption is drawn, the reader of prompts says what it means, and chance varies that.
 
-import functools
-from dataclasses import dataclass
+So what the prior is taught of words is what a prompt with these words begins with, give or take what they leave open.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
+from torch import Tensor
 
 from stages.core.color import srgb_encode
-from stages.prior.colors import COLORS, COMMON, draw_named, rgb
-from stages.prior.names import FINISHES, FINISHES_METAL, METALS, SUBSTANCES, Substance
-from stages.prior.patterns import DARK_BELOW, LEVEL, placement
-from stages.prior.recipe import Coat, Recipe, Surface, draw_layout
-from stages.train.captions import Words, caption, pick, pick_weighted
+from stages.material.recipe import Coat, Mask, Recipe
+from stages.prior.model import VOCABULARY_FILE
+from stages.prior.prompt import Reading
+from stages.prior.text import Vocabulary
+from stages.train.captions import caption, phrase, substance
 
-SHARES = np.cumsum([s.weight for s in SUBSTANCES])[:-1] / sum(s.weight for s in SUBSTANCES)
-"""Upper end of each substance's share of [0, 1), but the last's."""
+COLOR, CHANNEL, ROUGHNESS = 0.03, 0.018, 0.05
+"""Deviations of a coat's sRGB colour, of each channel besides, and of its roughness from what words say."""
 
-COARSEST = 0.6
-"""Least frequency of spots and stripes."""
-
-SHARED_FINISH = 0.45
-"""Share of coats that a finish word describes."""
+CONTRAST, METRES, SHARE, SIZE = 0.2, 0.35, 0.2, 0.25
+"""Likewise of the logarithms of its contrast, of the object's size, and of a mask's share and size."""
 
 
 @dataclass(frozen=True)
 class RandomMaterial:
-    """A recipe and a caption for it."""
+    """A recipe, not settled, and a caption for it."""
 
     caption: str
     recipe: Recipe
 
 
-KINDS = (("edges", 0.18), ("top", 0.32), ("spots", 0.13), ("stripes", 0.13), ("patches", 0.1), ("crevices", 0.14))
-"""Ways to lay a second coat, with their shares."""
+class Tables:
+    """All that reading a caption takes: its words are in the tables, so no network is asked."""
+
+    def __init__(self) -> None:
+        self.vocabulary = Vocabulary.load(VOCABULARY_FILE)
+
+    def read(self, prompts: list[str]) -> Tensor:
+        raise AssertionError(f"{prompts}: a caption holds only words that a table knows")
 
 
-def random_material(rng: Generator, composed: float = 0.4) -> RandomMaterial:
-    """Draw a material. composed: share of materials with two coats."""
-    words, base = draw_coat(rng, draw_substance(rng))
-    if rng.random() >= composed:
-        return RandomMaterial(caption(rng, words, None, None), Recipe((base,)))
-    kind = pick_weighted(rng, KINDS)
-    second_words, second = draw_coat(rng, second_substance(rng, kind))
-    recipe = Recipe((base, second), draw_layout(rng, kind, COARSEST))
-    return RandomMaterial(caption(rng, words, second_words, kind), recipe)
+@cache
+def tables() -> Tables:
+    """Loaded once."""
+    return Tables()
 
 
-def draw_substance(rng: Generator) -> Substance:
-    """A substance by its share."""
-    return SUBSTANCES[int(np.searchsorted(SHARES, rng.random(), side="right"))]
+def random_material(rng: Generator) -> RandomMaterial:
+    """Draw a material."""
+    text = caption(rng)
+    return RandomMaterial(text, varied(rng, Reading(tables()).recipe(text, int(rng.integers(2**31)))))
 
 
-def second_substance(rng: Generator, kind: str) -> Substance:
-    """What lies on top: in crevices mostly what gathers there, on edges mostly metal."""
-    if kind == "crevices" and rng.random() < 0.7:
-        gathers = [s for s in SUBSTANCES if s.names[0] in ("moss", "rust", "dirt", "verdigris", "snow")]
-        return gathers[rng.integers(len(gathers))]
-    if kind == "edges" and rng.random() < 0.5:
-        return METALS[rng.integers(len(METALS))]
-    return draw_substance(rng)
+def random_coat(rng: Generator) -> tuple[str, Coat]:
+    """A phrase of one substance, and what it calls for."""
+    text = phrase(rng, substance(rng))
+    return text, Reading(tables()).recipe(text, 0).base
 
 
-def draw_coat(rng: Generator, substance: Substance) -> tuple[Words, Coat]:
-    """Draw a substance's colour, finish and pattern, and the words that tell them."""
-    color, color_word = draw_color(rng, substance)
-    roughness = rng.uniform(*substance.roughness)
-    pattern, contrast, spread, finish = substance.pattern, substance.contrast, 0.08, ""
-    if rng.random() < SHARED_FINISH:
-        finish, roughness = draw_finish(rng, substance)
-        pattern = "streaks" if finish == "brushed" else pattern
-    wear = rng.random()
-    worn = wear < 0.12
-    if worn:
-        condition, lift, spread = WORN[rng.integers(len(WORN))]
-        roughness, contrast = min(roughness + lift, 1.0), contrast + 0.12
-        finish = condition if not finish else f"{condition} {finish}"
-    lightness = contrast * rng.uniform(0.5, 1.2) * (0.35 + 0.65 * float(color.mean()))
-    second = color - lightness * 0.5 * (1 + rng.normal(0, 0.12, 3)) * (-1 if rng.random() < 0.15 else 1)
-    if pattern in DARK_BELOW:
-        second = 2 * color - second
-    turn, shift = placement(rng, pattern in LEVEL)
-    scale = float(np.exp(rng.uniform(np.log(1.5), np.log(6))))
-    words = Words(pick(rng, substance.names), color_word, finish, substance.family)
-    spread *= rng.uniform(0.2, 1)
-    return words, Coat(color, second, roughness, spread, substance.metallic, pattern, scale, turn, shift)
+def varied(rng: Generator, recipe: Recipe) -> Recipe:
+    """A recipe with its numbers moved at random, within what its words mean."""
+    metres = np.exp(rng.normal(0, METRES))
+
+    def coat(old: Coat) -> Coat:
+        color = None if old.color is None else _near(rng, np.array(old.color))
+        rough = None if old.roughness is None else float(np.clip(old.roughness + rng.normal(0, ROUGHNESS), 0, 1))
+        contrast = old.contrast * float(np.exp(rng.normal(0, CONTRAST)))
+        return replace(old, color=color, roughness=rough, contrast=contrast, metres=float(old.metres * metres))
+
+    def mask(old: Mask) -> Mask:
+        share, size = (float(v * np.exp(rng.normal(0, s))) for v, s in ((old.share, SHARE), (old.size, SIZE)))
+        return replace(old, share=min(share, max(old.share, 0.95)), size=size)
+
+    layers = (replace(old, coat=coat(old.coat), masks=tuple(map(mask, old.masks))) for old in recipe.layers)
+    return replace(recipe, base=coat(recipe.base), layers=tuple(layers))
 
 
-WORN = (
-    # word, what it adds to roughness, how much roughness then varies
-    ("worn", 0.12, 0.2), ("scratched", 0.08, 0.2), ("old", 0.12, 0.15), ("dusty", 0.25, 0.12), ("weathered", 0.2, 0.18),
-    ("dirty", 0.15, 0.2), ("aged", 0.12, 0.15), ("grimy", 0.12, 0.2),
-)
-
-
-def draw_color(rng: Generator, substance: Substance) -> tuple[NDArray, str]:
-    """sRGB (3,) and the word for it, empty when it goes without saying."""
-    if substance.paintable and rng.random() < 0.8:
-        word, color = draw_named(rng)
-        return vary(rng, color, 0.035), word
-    first, second = pick(rng, substance.colors), pick(rng, substance.colors)
-    if substance.paintable:
-        return vary(rng, rgb(first), 0.03), nearest_color(first)
-    mixed = rgb(first) + (rgb(second) - rgb(first)) * rng.random()
-    return vary(rng, mixed, 0.01 if substance.metallic else 0.025), ""
-
-
-def draw_finish(rng: Generator, substance: Substance) -> tuple[str, float]:
-    """A finish word that suits the substance, and the roughness it means."""
-    table = FINISHES_METAL if substance.metallic else FINISHES
-    words = list(table)
-    if substance.family in ("fabric", "paper", "rust"):
-        words = [word for word in words if table[word][0] >= 0.35]
-    word = pick(rng, words)
-    return word, float(rng.uniform(*table[word]))
-
-
-def vary(rng: Generator, color: NDArray, amount: float) -> NDArray:
-    """A colour nearby: lightness and each channel shifted a little."""
-    return np.clip(color + rng.normal(0, amount) + rng.normal(0, amount * 0.6, 3), 0.02, 0.98)
-
-
-@functools.lru_cache(maxsize=1024)
-def nearest_color(text: str) -> str:
-    """The common colour name whose sRGB is nearest to that of "#rrggbb"."""
-    return min(COMMON, key=lambda word: float(((rgb(COLORS[word]) - rgb(text)) ** 2).sum()))
-
-
-def stand_in(rng: Generator, count: int) -> Surface:
-    """Points of a surface that is mostly flat and open, on which the reader of prompts learns."""
-    normal = rng.normal(size=(count, 3))
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    return Surface(
-        rng.uniform(-0.5, 0.5, (count, 3)).astype(np.float32),
-        normal.astype(np.float32),
-        rng.normal(0, 0.18, count).clip(-1, 1).astype(np.float32),
-        np.abs(rng.normal(0, 0.25, count)).clip(0, 1).astype(np.float32),
-    )
+def _near(rng: Generator, color: NDArray) -> tuple[float, float, float]:
+    red, green, blue = np.clip(color + rng.normal(0, COLOR) + rng.normal(0, CHANNEL, 3), 0.02, 0.98).tolist()
+    return red, green, blue
 
 
 def encoded(values: NDArray) -> NDArray[np.float32]:

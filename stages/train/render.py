@@ -2,7 +2,8 @@
 
 Shading is linear, so light is traced once for each tile and any material is shaded on it later (`batches.py`). A
 *tile* is one 64² picture: every fourth pixel of a 256² view, or a crop of every second or every single one, so that its
-pixels are point samples as distillation takes them. A *shard* holds tiles that share a set of lights.
+pixels are point samples as distillation takes them. A *shard* holds tiles that share a set of lights, and of each shape
+what a material must know of it.
 """
 
 from pathlib import Path
@@ -12,33 +13,54 @@ from numpy.random import Generator, default_rng
 from numpy.typing import NDArray
 
 from stages.core.artifact import Field, Provenance, Schema, peek, save_npz
-from stages.core.convexity import SurfaceSamples
-from stages.core.frames import look_at, tangent_frame
+from stages.core.frames import look_at
 from stages.core.progress import Progress
 from stages.core.shading import KNOTS
 from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.scene import Scene
 from stages.light.transport import Quality, light_transport
+from stages.material.directions import Pieces
+from stages.material.surface import Surface
+from stages.material.survey import POINTS, Lookup, make_survey
 from stages.prior.profile import SIZE
 from stages.train.lights import random_light
 from stages.train.shapes import Shape, make_shape
 
+EVEN = 2000
+"""Points spread evenly over a shape, on which masks are settled."""
+
 SHARD = Schema(
     "dreammat.shard",
-    1,
+    2,
     {
         "start": Field("i8", ("T1",)),  # points of tile i are start[i] ... start[i + 1] - 1, its mask's pixels in order
+        "shape": Field("i4", ("T",)),
         "mask": Field("?", ("T", SIZE, SIZE)),
         "depth": Field("f4", ("T", SIZE, SIZE)),  # planar, 0 off the object
         "to_view": Field("f4", ("T", 3, 3)),  # world direction to view space
-        "point": Field("f4", ("P", 3)),
+        "point": Field("f4", ("P", 3)),  # the fields of `material.surface.Surface`, from here to the piece
         "normal": Field("f4", ("P", 3)),  # world, facing the viewer
-        "cosine": Field("f4", ("P",)),  # N·V
+        "footprint": Field("f4", ("P",)),
         "convexity": Field("f4", ("P",)),
         "occlusion": Field("f4", ("P",)),
+        "piece": Field("i4", ("P",)),
+        "cosine": Field("f4", ("P",)),  # N·V
         "transport": Field("f2", ("P", "L", 1 + 2 * len(KNOTS), 3)),  # per light: E, A at the knots, B at the knots
+        "even_point": Field("f4", ("H", EVEN, 3)),  # likewise, of each shape
+        "even_normal": Field("f4", ("H", EVEN, 3)),
+        "even_footprint": Field("f4", ("H", EVEN)),
+        "even_convexity": Field("f4", ("H", EVEN)),
+        "even_occlusion": Field("f4", ("H", EVEN)),
+        "even_piece": Field("i4", ("H", EVEN)),
+        "pieces_shape": Field("i4", ("K",)),  # the shape that each piece belongs to, in order
+        "pieces_centre": Field("f4", ("K", 3)),
+        "pieces_turn": Field("f4", ("K", 3, 3)),
+        "pieces_radius": Field("f4", ("K",)),
+        "pieces_grain": Field("f4", ("K", 3)),
     },
 )
+
+SURFACE = ("point", "normal", "footprint", "convexity", "occlusion", "piece")
 
 VIEW = 256
 """Pixels along an edge of the view that tiles are cut from."""
@@ -76,18 +98,22 @@ def render_shard(index: int, tiles: int, seed: int) -> dict[str, NDArray]:
     rng = default_rng([seed, index])
     lights = [random_light(rng, f"light_{k}") for k in range(LIGHTS)]
     done: list[dict[str, NDArray]] = []
+    known: list[Lookup] = []
     while len(done) < tiles:
         shape = make_shape(rng)
         scene = Scene(shape.vertices, shape.triangles, shape.normals)
-        neighbours = samples_of(shape, rng)
+        survey = make_survey(shape.vertices, shape.triangles, shape.normals, scene.occluded, int(rng.integers(2**31)))
+        known.append(Lookup(survey))
         for _ in range(2):
             c2w, fov = random_camera(shape, rng)
             view = trace_view(scene, c2w, fov, VIEW, VIEW)
             for stride in (4, int(rng.choice([2, 2, 1]))):
                 tile = cut(view, stride, rng)
                 if tile.mask.mean() >= SMALLEST_COVER:
-                    done.append(render_tile(scene, tile, c2w, lights, neighbours, rng))
-    return pack(done[:tiles])
+                    width = stride * 2 * np.tan(fov / 2) / VIEW
+                    one = render_tile(scene, tile, c2w, lights, known[-1], width, int(rng.integers(2**31)))
+                    done.append({"shape": np.array(len(known) - 1, np.int32), **one})
+    return pack(done[:tiles]) | shapes_of(known)
 
 
 def random_camera(shape: Shape, rng: Generator) -> tuple[NDArray[np.float64], float]:
@@ -122,49 +148,42 @@ def cut(view: GBuffer, stride: int, rng: Generator) -> GBuffer:
 
 
 def render_tile(
-    scene: Scene, tile: GBuffer, c2w: NDArray, lights: list, neighbours: SurfaceSamples, rng: Generator
+    scene: Scene, tile: GBuffer, c2w: NDArray, lights: list, known: Lookup, width: float, seed: int
 ) -> dict[str, NDArray]:
-    """Arrays of one tile, as the shard's but for `start`."""
-    transports = light_transport(scene, tile, lights, TILE_RAYS, int(rng.integers(2**31)))
-    count = len(tile.n)
+    """Arrays of one tile, as the shard's but for `start` and `shape`. Args: width: of a pixel at depth 1."""
+    transports = light_transport(scene, tile, lights, TILE_RAYS, seed)
     values = [np.concatenate([t.E[:, None].numpy(), t.A.numpy(), t.B.numpy()], 1) for t in transports]
+    footprint = (width * tile.depth[tile.mask]).astype(np.float32)
+    surface = known.surface(tile.point.astype(np.float32), tile.n.astype(np.float32), footprint)
     return {
         "mask": tile.mask,
         "depth": np.where(tile.mask, tile.depth, 0).astype(np.float32),
         "to_view": c2w[:3, :3].T.astype(np.float32),
-        "point": tile.point.astype(np.float32),
-        "normal": tile.n.astype(np.float32),
+        **columns(surface),
         "cosine": transports[0].cosine.numpy(),
-        "convexity": neighbours.convexity(tile.point, tile.ng),
-        "occlusion": occlusion(scene, tile, rng),
-        "transport": np.minimum(np.stack(values, 1), 30000).astype(np.float16).reshape(count, len(lights), -1, 3),
+        "transport": np.minimum(np.stack(values, 1), 30000).astype(np.float16).reshape(len(tile.n), len(lights), -1, 3),
     }
+
+
+def columns(surface: Surface, prefix: str = "") -> dict[str, NDArray]:
+    """A surface as arrays by name."""
+    return {prefix + name: getattr(surface, name) for name in SURFACE}
 
 
 def pack(tiles: list[dict[str, NDArray]]) -> dict[str, NDArray]:
     """Tiles as a shard's arrays."""
-    whole = ("mask", "depth", "to_view")
+    whole = ("shape", "mask", "depth", "to_view")
     arrays = {name: (np.stack if name in whole else np.concatenate)([t[name] for t in tiles]) for name in tiles[0]}
     return {"start": np.cumsum([0, *(len(t["point"]) for t in tiles)]).astype(np.int64), **arrays}
 
 
-def occlusion(scene: Scene, tile: GBuffer, rng: Generator, rays: int = 24) -> NDArray[np.float32]:
-    """Share of cosine-weighted directions that are blocked, (P,)."""
-    count = len(tile.ng)
-    u = rng.random((count, rays, 2))
-    radius, angle = np.sqrt(u[..., 0]), 2 * np.pi * u[..., 1]
-    t, b = (axis[:, None] for axis in tangent_frame(tile.ng))
-    x, y = (radius * np.cos(angle))[..., None], (radius * np.sin(angle))[..., None]
-    directions = x * t + y * b + np.sqrt(1 - u[..., :1]) * tile.ng[:, None]
-    blocked = scene.occluded(np.repeat(tile.origin, rays, 0), directions.reshape(-1, 3).astype(np.float32))
-    return blocked.reshape(count, rays).mean(1).astype(np.float32)
-
-
-def samples_of(shape: Shape, rng: Generator, count: int = 16000) -> SurfaceSamples:
-    """Points spread over a shape."""
-    a, b, c = (shape.vertices[shape.triangles[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).astype(np.float64)
-    pick = rng.choice(len(area), count, p=area / area.sum())
-    u = np.sqrt(rng.random((count, 1)))
-    v = rng.random((count, 1))
-    return SurfaceSamples((1 - u) * a[pick] + u * (1 - v) * b[pick] + u * v * c[pick])
+def shapes_of(known: list[Lookup]) -> dict[str, NDArray]:
+    """Evenly spread points and pieces of the shapes."""
+    even = [columns(lookup.survey.surface()[:POINTS : POINTS // EVEN], "even_") for lookup in known]
+    pieces = [lookup.survey.pieces for lookup in known]
+    counts = [len(p.centre) for p in pieces]
+    return {
+        **{name: np.stack([e[name] for e in even]) for name in even[0]},
+        "pieces_shape": np.repeat(np.arange(len(known), dtype=np.int32), counts),
+        **{f"pieces_{name}": np.concatenate([getattr(p, name) for p in pieces]) for name in Pieces._fields},
+    }

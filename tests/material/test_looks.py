@@ -1,5 +1,7 @@
 """Every substance: finite and in range, tiling, the same on average at any footprint, with detail down to the texel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,6 +29,13 @@ def test_a_look_is_a_material(name: str) -> None:
     for channel in (found.roughness, found.metallic, found.dye):
         assert np.min(channel) > -0.3 and np.max(channel) < 1.3 and 0 <= np.mean(channel) <= 1
     assert abs(np.asarray(found.height)).max() < 0.06  # metres
+
+
+@pytest.mark.parametrize("name", DISTINCT)
+def test_a_look_takes_any_seed(name: str) -> None:
+    """Recipes make seeds of seeds: they grow beyond 64 bits."""
+    found = LOOKS[name](replace(square(METRES[name], 8), seed=2**31 * 1_000_003**3))
+    assert np.isfinite(found.color).all()
 
 
 @pytest.mark.parametrize("name", DISTINCT)

@@ -46,12 +46,10 @@ def test_batches_depend_on_seed_and_step_alone(shards: list[Path]) -> None:
     assert one.material.min() >= 0 and one.material.max() <= 1
 
 
-def test_captions_and_their_materials_agree_in_number() -> None:
+def test_phrases_and_their_materials_agree_in_number() -> None:
     batch = CaptionBatches(40, 0)[0]
-    assert len(batch.captions) == 40 and batch.coats.shape == (40, 2, 5)
-    single = batch.layout == 0
-    assert 4 < int(single.sum()) < 36
-    assert bool((batch.coats[single, 1] == 0).all()) and bool((batch.coats[~single, 1].sum(1) > 0).all())
+    assert len(batch.captions) == 40 and batch.coats.shape == (40, 5)
+    assert batch.coats.min() >= 0 and batch.coats.max() <= 1 and 0 < batch.coats[:, 4].mean() < 1
 
 
 def test_training_resumes_to_the_same_bytes(tmp_path: Path, quick: None) -> None:

@@ -4,7 +4,21 @@ import numpy as np
 
 from stages.material.look import Look, each, mix, palette, shade, tint
 from stages.material.noise_kernels import random_numbers
-from stages.material.patterns import Array, Spectrum, cracks, edge, fading, fbm, marks, masked, noise, repeats, spots, warped
+from stages.material.patterns import (
+    Array,
+    Spectrum,
+    cracks,
+    edge,
+    fading,
+    fbm,
+    marks,
+    masked,
+    noise,
+    repeats,
+    seed_of,
+    spots,
+    warped,
+)
 from stages.material.place import Place
 
 
@@ -40,7 +54,7 @@ def printed(at: Place, width: float, leading: float, weight: float, seed: int) -
         h = (
             (column.astype(np.int64) + int(step)) * 0x8DA6B343
             ^ row.astype(np.int64) * 0xD8163841
-            ^ (at.seed * 977 + seed) * 0x9E3779B1
+            ^ int(seed_of(at, seed))
         )
         return random_numbers((h & 0xFFFFFFFF).astype(np.uint32), number)
 
