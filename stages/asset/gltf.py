@@ -6,6 +6,7 @@ Source: Khronos glTF 2.0 specification, sections 3 (concepts) and 4 (GLB). Image
 import importlib.metadata
 import json
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -101,7 +102,7 @@ def write_glb(path: Path, model: Model, look: Look) -> None:
     if extensions := _extensions(document["materials"]):
         document["extensionsUsed"] = extensions
     document |= {"accessors": buffer.accessors, "bufferViews": buffer.views, "buffers": [{"byteLength": buffer.length}]}
-    _write_chunks(path, document, buffer)
+    write_chunks(path, document, buffer.pieces)
 
 
 def _extensions(content: Any) -> list[str]:
@@ -218,12 +219,15 @@ def _primitive(part: Part, materials: list[str], buffer: _Buffer) -> dict[str, A
     }
 
 
-def _write_chunks(path: Path, document: dict[str, Any], buffer: _Buffer) -> None:
+def write_chunks(path: Path, document: dict[str, Any], pieces: Iterable[bytes]) -> None:
+    """Write a GLB atomically. Args: document: its JSON part. pieces: its binary part; the last is filled up to four bytes."""
     text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
     text += b" " * (-len(text) % 4)
+    pieces = list(pieces)
+    length = sum(map(len, pieces))
+    filling = -length % 4
     with written_atomically(path) as temporary, open(temporary, "wb") as stream:
-        stream.write(struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(text) + 8 + buffer.length))
+        stream.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + length + filling))
         stream.write(struct.pack("<I4s", len(text), b"JSON") + text)
-        stream.write(struct.pack("<I4s", buffer.length, b"BIN\0"))
-        for piece in buffer.pieces:
-            stream.write(piece)
+        stream.write(struct.pack("<I4s", length + filling, b"BIN\0"))
+        stream.writelines([*pieces, b"\0" * filling])

@@ -15,7 +15,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
-from stages.core.artifact import reason, written_atomically
+from stages.core.artifact import reason
 from stages.core.errors import ArtifactError, one_line
 
 COMPONENTS = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -199,14 +199,3 @@ def _nodes(nodes: list[dict[str, Any]], index: int, above: NDArray, meshes: list
     matrix = above @ np.reshape(node.get("matrix", np.eye(4)), (4, 4)).T  # stored column by column
     own = [Node(node.get("name", "mesh"), matrix, meshes[node["mesh"]])] if "mesh" in node else []
     return own + [n for child in node.get("children", []) for n in _nodes(nodes, child, matrix, meshes)]
-
-
-def write_chunks(path: Path, root: dict[str, Any], chunk: bytes) -> None:
-    """Write a GLB of a JSON and a binary part, atomically."""
-    text = json.dumps(root, separators=(",", ":"), allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    chunk += b"\0" * (-len(chunk) % 4)
-    with written_atomically(path) as temporary, open(temporary, "wb") as stream:
-        stream.write(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(chunk)))
-        stream.write(struct.pack("<I4s", len(text), b"JSON") + text)
-        stream.write(struct.pack("<I4s", len(chunk), b"BIN\0") + chunk)

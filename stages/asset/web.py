@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.asset.folder import Asset
-from stages.asset.read_glb import COMPONENTS, WIDTHS, Picture, TexturedModel, eight_bit, write_chunks
+from stages.asset.gltf import write_chunks
+from stages.asset.read_glb import COMPONENTS, WIDTHS, Picture, TexturedModel, eight_bit
 from stages.asset.webp import encode_webp
 
 POSITION_BITS, UV_BITS, NORMAL_BITS = 16, 16, 12
@@ -34,7 +35,8 @@ COLOURS = {"albedo", "emission"}
 def write_web(asset: Asset, out: Path) -> list[str]:
     """Write <Name>.glb."""
     name = f"{asset.name}.glb"
-    write_chunks(out / name, *compressed(asset.model))
+    root, chunk = compressed(asset.model)
+    write_chunks(out / name, root, [chunk])
     return [name]
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
 from stages.core.color import srgb_encode
 from stages.core.frames import camera_rays
+from stages.core.images import labelled
 from stages.core.parallel import in_parallel
 from stages.core.progress import Progress
 from stages.core.shading import Material, shade
@@ -37,9 +38,6 @@ TILE, MARGIN = 320, 16
 
 STRETCH = 4.0
 """How many times longer than wide what a point stands for may be: towards the horizon it would reach beyond the surface."""
-
-TEXT_HEIGHT = 14
-"""Pixels."""
 
 
 @dataclass(frozen=True)
@@ -205,14 +203,6 @@ def atlas(maps: NDArray[np.float32], size: int) -> NDArray[np.float32]:
     linear = oiio.ImageBuf(np.ascontiguousarray(maps[..., :3]))
     small = oiio.ImageBufAlgo.resize(linear, filtername="box", roi=oiio.ROI(0, size, 0, size, 0, 1, 0, 3))
     return srgb_encode(np.asarray(small.get_pixels(oiio.FLOAT), np.float32).reshape(size, size, 3))
-
-
-def labelled(cell: NDArray[np.float32], text: str) -> NDArray[np.float32]:
-    """A picture with its name in a corner; without, where OpenImageIO finds no font."""
-    picture = oiio.ImageBuf(np.ascontiguousarray(cell, np.float32))
-    left, base = TEXT_HEIGHT // 2, 3 * TEXT_HEIGHT // 2
-    oiio.ImageBufAlgo.render_text(picture, left, base, text, TEXT_HEIGHT, "", (0.95, 0.95, 0.95), shadow=2)
-    return np.asarray(picture.get_pixels(oiio.FLOAT), np.float32).reshape(cell.shape)
 
 
 def over(alpha: NDArray[np.bool_], color: NDArray[np.float32], background: NDArray[np.float32]) -> NDArray[np.float32]:

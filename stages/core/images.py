@@ -1,4 +1,4 @@
-"""Eight-bit and HDR pictures through OpenImageIO: PNG out and in, Radiance HDR in."""
+"""Eight-bit and HDR pictures through OpenImageIO: PNG out and in, Radiance HDR in, and names written into them."""
 
 import tempfile
 from pathlib import Path
@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import written_atomically
 from stages.core.errors import InputError
+
+TEXT_HEIGHT = 14
+"""Of names in pictures, pixels."""
 
 
 def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
@@ -64,3 +67,11 @@ def read_image(path: Path) -> NDArray[np.float32]:
     if pixels is None:
         raise InputError(f"{path}: not a readable picture ({problem.strip()})")
     return pixels
+
+
+def labelled(picture: NDArray[np.float32], text: str) -> NDArray[np.float32]:
+    """A picture (H, W, 3), encoded, with its name in a corner; without, where OpenImageIO finds no font."""
+    image = oiio.ImageBuf(np.ascontiguousarray(picture, np.float32))
+    left, base = TEXT_HEIGHT // 2, 3 * TEXT_HEIGHT // 2
+    oiio.ImageBufAlgo.render_text(image, left, base, text, TEXT_HEIGHT, "", (0.95, 0.95, 0.95), shadow=2)
+    return np.asarray(image.get_pixels(oiio.FLOAT), np.float32).reshape(picture.shape)

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from stages.core.artifact import write_text
 from stages.core.color import luminance, srgb_decode, srgb_encode
 from stages.core.errors import InputError
-from stages.core.images import read_image, write_png
+from stages.core.images import labelled, read_image, write_png
 from stages.core.parallel import cores
 from stages.core.progress import Progress, silent
 from stages.material.recipe import Coat, Recipe
@@ -123,13 +122,6 @@ def pictures(made: Swatch) -> dict[str, NDArray[np.float32]]:
     raking = made.albedo[part, part] * (0.25 + 1.5 * lit[..., None])
     close = np.kron(made.albedo[:TEXELS, :TEXELS], np.ones((CELL // TEXELS, CELL // TEXELS, 1), np.float32))
     return {name: srgb_encode(color) for name, color in {"whole": whole, "raking": raking, "close": close}.items()}
-
-
-def labelled(picture: NDArray[np.float32], name: str) -> NDArray[np.float32]:
-    """A picture with its name in a corner."""
-    image = oiio.ImageBuf(np.ascontiguousarray(picture, np.float32))
-    oiio.ImageBufAlgo.render_text(image, 5, 16, name, 13, "", (1.0, 1.0, 1.0), shadow=2)
-    return np.asarray(image.get_pixels(oiio.FLOAT), np.float32).reshape(picture.shape)
 
 
 def tiled(cells: list[NDArray[np.float32]]) -> NDArray[np.float32]:

@@ -15,6 +15,7 @@ from stages.core.shading import Material, shade
 from stages.core.tangents import mikktspace
 from stages.light.gbuffer import trace_view
 from stages.light.lights import BUILTIN
+from stages.light.lookup import REPEAT, look_up
 from stages.light.normal_maps import NormalMap, NormalMaps
 from stages.light.scene import Scene
 from stages.light.transport import Quality, cached_light_set, light_transport
@@ -82,7 +83,7 @@ def _pictures(thing: Thing, lights: list, material: NDArray, normal: NDArray, si
     hits = trace_view(scene, thing.c2w, float(FOV_Y), size, size)
     cover = covered(scene, thing.c2w, size)
     uv = np.einsum("pk,pkd->pd", hits.barycentric, down[hits.triangle])
-    values = torch.from_numpy(Tile(material).at(uv))
+    values = torch.from_numpy(look_up(material, uv, wrap=(REPEAT, REPEAT)))
     pictures = []
     for transport in light_transport(scene, hits, lights, RAYS, seed=0):
         white = float(transport.E.mean())
@@ -102,23 +103,6 @@ def nearest_hit(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
     """For each pixel the number of the hit one nearest to it. Args: (H, W). Returns: (H, W)."""
     row, column = distance_transform_edt(~mask, return_distances=False, return_indices=True)
     return (np.cumsum(mask) - 1).reshape(mask.shape)[row, column]
-
-
-class Tile(NamedTuple):
-    """Any tile, looked up bilinearly where it repeats."""
-
-    values: NDArray[np.float32]
-
-    def at(self, uv: NDArray) -> NDArray[np.float32]:
-        """(K, C) at uv (K, 2), v down."""
-        height, width, _ = self.values.shape
-        x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
-        column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-        fx, fy = (x - column)[:, None], (y - row)[:, None]
-        left, right, top, bottom = column % width, (column + 1) % width, row % height, (row + 1) % height
-        upper = self.values[top, left] * (1 - fx) + self.values[top, right] * fx
-        lower = self.values[bottom, left] * (1 - fx) + self.values[bottom, right] * fx
-        return (upper * (1 - fy) + lower * fy).astype(np.float32)
 
 
 def sphere() -> Thing:

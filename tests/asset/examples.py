@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.asset.read_glb import write_chunks
+from stages.asset.gltf import write_chunks
 from stages.core.artifact import Provenance, write_manifest
 from stages.core.images import write_png
 from stages.core.schemas import ASSET
@@ -115,7 +115,7 @@ def save_asset(
         "samplers": [{"magFilter": 9729, "minFilter": 9987, "wrapS": 33071, "wrapT": 33071}],
         "accessors": parts.accessors, "bufferViews": parts.views, "buffers": [{"byteLength": len(parts.chunk)}],
     }  # fmt: skip
-    write_chunks(folder / "model.glb", root, bytes(parts.chunk))
+    write_chunks(folder / "model.glb", root, [bytes(parts.chunk)])
     files = [path.name for path in folder.iterdir()]
     write_manifest(folder, ASSET, Provenance({}, 5, {"prep": "0" * 64}, {"source_name": source, "prompt": "a thing"}), files)
     return folder
