@@ -10,6 +10,7 @@ DIFFUSION := $(VENV)/.diffusion
 MITSUBA := $(VENV)/.mitsuba
 CYCLES  := $(VENV)/.cycles
 CHROMIUM := $(VENV)/.chromium
+THREE   := $(VENV)/.three
 
 # one job: make asset MESH=chair.obj PROMPT="a carved oak chair" OUT=assets/chair
 MESH   ?=
@@ -20,6 +21,9 @@ OUT    ?= assets/$(NAME)
 JOBS   ?= jobs
 # what `make export` writes every asset of JOBS for
 FOR    ?= blender
+# meshes that `make beside` lays beside Cycles and three.js, and what they are made of
+BESIDE ?= demo/urn.obj bench/egg.obj bench/drum.obj
+STUFF  ?= weathered copper with verdigris in the crevices
 
 # options of each stage, to override on the command line
 PREP_OPTIONS       ?=
@@ -29,7 +33,7 @@ BAKE_OPTIONS       ?=
 
 .DELETE_ON_ERROR:
 .SECONDARY:
-.PHONY: help setup demo test campaign hostile lint asset batch export bench clean
+.PHONY: help setup demo test campaign hostile lint asset batch export bench beside clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -133,7 +137,19 @@ bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light 
 	$(MAKE) demo/prep.npz
 	$(DREAMMAT) report conditions demo/prep.npz -o bench $$(cat $(MITSUBA) $(CYCLES))
 	@echo "look at bench/conditions.png"
-	[ ! -s $(CYCLES) ] || { $(MAKE) demo && $(DREAMMAT) report preview demo/asset -o bench $$(cat $(CYCLES)); }
+	$(MAKE) beside
+
+bench/egg.obj: examples/convex.py | $(VENV)/.ready
+	$(RUN)/python $< bench
+
+bench/drum.obj: bench/egg.obj ;
+
+beside: $(BESIDE) | $(CYCLES) $(THREE) $(CHROMIUM)  ## assets in Cycles and three.js beside their preview: make beside BESIDE="a.obj b.glb"
+	@for mesh in $(BESIDE); do name=$$(basename "$${mesh%.*}"); $(MAKE) --no-print-directory asset MESH="$$mesh" OUT="bench/$$name" \
+	PROMPT="$(STUFF)" CONDITIONS_OPTIONS='--views 16 --size 128' BAKE_OPTIONS='--size 1024' || exit; done
+	[ ! -s $(CYCLES) -a ! -s $(THREE) ] || $(DREAMMAT) report preview -o bench $$(cat $(CYCLES) $(THREE)) \
+	$(foreach mesh,$(BESIDE),bench/$(basename $(notdir $(mesh)))/asset)
+	@echo "look at bench/preview_*.png: ours, theirs, eight times the difference"
 
 # other renderers, each in a virtual environment of its own; an empty file where it cannot be had or does not run
 $(MITSUBA): | $(VENV)/.ready
@@ -145,6 +161,10 @@ $(CYCLES): | $(VENV)/.ready
 	@$(PYTHON) -m venv $(VENV)/cycles && $(VENV)/cycles/bin/python -m pip install --quiet 'bpy>=4.2,<5' && \
 	$(VENV)/cycles/bin/python -c 'import bpy' && \
 	echo --cycles $(VENV)/cycles/bin/python > $@ || { echo "bpy does not run here: no side-by-side with Cycles"; : > $@; }
+
+$(THREE): | $(VENV)/.ready
+	@npm install --silent --no-audit --no-fund --prefix $(VENV) three >/dev/null 2>&1 && command -v chromium >/dev/null && \
+	echo --three $(VENV)/node_modules > $@ || { echo "no three.js or no chromium here: no side-by-side with it"; : > $@; }
 
 clean:  ## remove the virtual environment and the demo
 	rm -rf $(VENV) demo

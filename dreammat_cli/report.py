@@ -175,18 +175,18 @@ def materials(output: Path, references: Path | None, common: Common) -> None:
 
 
 @command.command()
-@click.argument("asset", type=INPUT, metavar="ASSET")
+@click.argument("assets", type=INPUT, nargs=-1, required=True, metavar="ASSET...")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV and the pictures.")
 @click.option("--cycles", default="", metavar="PYTHON", help="A Python that has the package bpy (Blender).")
 @click.option("--three", default="", metavar="FOLDER", help="A folder node_modules that has three; needs Chromium.")
 @common_options
-def preview(asset: Path, output: Path, common: Common, **chosen: Any) -> None:
-    """Render the model of the folder ASSET in other programs, as preview.json says, and compare with preview.png."""
+def preview(assets: tuple[Path, ...], output: Path, common: Common, **chosen: Any) -> None:
+    """Render the model of each folder ASSET in other programs, as preview.json says, and compare with preview.png."""
     options = PreviewReportOptions(**chosen)
     if plan(common, "compare into", output, options):
         return
     from stages.report.preview import report_preview
 
-    rows = report_preview(asset, output, options)
+    rows = report_preview(assets, output, options)
     show(common, {"rows": [dataclasses.asdict(row) for row in rows]},
-         [f"{row.renderer:7} view {row.view}  {row.psnr:.2f} dB" for row in rows])
+         [f"{row.asset:12} {row.renderer:7} view {row.view}  {row.psnr:.2f} dB" for row in rows])

@@ -1,26 +1,28 @@
-"""An asset in Cycles and in three.js beside preview.png: the same light, cameras and exposure, PSNR over the object.
+"""Assets in Cycles and in three.js beside preview.png: the same light, cameras and exposure, PSNR over the object.
 
 What is rendered is what others would open: model.glb with its own textures, normals and tangents, and preview_light.exr
 as the world; preview.json has the cameras. Blender has a Python of its own, in which this file is run as a script.
-Cycles: direct light alone, as the preview; Principled's GGX without multiple scattering, as in glTF.
-three.js: its standard material and image-based lighting as they come, in headless Chromium (`three.html`).
+Cycles: direct light alone, as the preview; Principled's GGX without multiple scattering, as in glTF. What shines is seen and
+lights nothing else, as in the preview and in engines.
+three.js: its standard material and image-based lighting as they come, in headless Chromium (`stages.report.three`).
 """
 
 import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from stages.report.options import PreviewReportOptions
 
-SAMPLES = 256
-"""Of Cycles, a pixel: with a quarter of them its noise is most of the difference where it is dark."""
+SAMPLES = 128
+"""Of Cycles, a pixel: with half of them its noise is most of the difference where it is dark."""
 
 VIEWS = (0, 3, 6)
 """Which of the preview's views are compared: from before, from above, from below."""
@@ -42,45 +44,66 @@ FROM_GLTF = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
 class Beside:
     """One view in another renderer. psnr: dB of the encoded picture over the object."""
 
+    asset: str
     renderer: str
     view: int
     psnr: float
 
 
-def report_preview(asset: Path, out: Path, options: "PreviewReportOptions") -> list[Beside]:
-    """Render model.glb elsewhere and compare; writes preview.csv and, for each renderer, a picture: ours, theirs, difference.
+def report_preview(assets: Sequence[Path], out: Path, options: "PreviewReportOptions") -> list[Beside]:
+    """Render each model.glb elsewhere and compare; writes preview.csv and pictures: ours, theirs, difference.
 
     Raises: ArtifactError, InputError.
     """
-    from stages.core.artifact import (
-        intact,
-        read_json,
-        read_manifest,
-        write_text,
-    )  # not to be had where this file runs as a script
+    from stages.core.artifact import read_json, write_text  # not to be had where this file runs as a script
     from stages.core.errors import InputError
     from stages.core.images import read_image, write_png
-    from stages.core.schemas import ASSET
     from stages.report.three import draw
 
     if not (options.cycles or options.three):
         raise InputError("nothing to compare with; give --cycles PYTHON, --three FOLDER, or both")
-    files = read_manifest(asset, ASSET)[1]
-    for name in NEEDED:
-        intact(asset, name, files)
-    studio, ours = read_json(asset / "preview.json"), read_image(asset / "preview.png")[..., :3]
+    named = {named_asset(asset): asset for asset in assets}
+    if len(named) < len(assets):
+        raise InputError("two assets of one name, which their pictures would share; compare one after the other")
     out.mkdir(parents=True, exist_ok=True)
     rows = []
-    for renderer, given, drawing in (("cycles", options.cycles, in_blender), ("three", options.three, draw)):
-        if given:
-            theirs = drawing(given, asset, [studio["views"][view] for view in VIEWS], studio)
-            pairs = [(cell(ours, studio, view), *shown(picture, studio)) for view, picture in zip(VIEWS, theirs, strict=True)]
-            rows += [Beside(renderer, view, psnr(a, b, on)) for view, (a, b, on) in zip(VIEWS, pairs, strict=True)]
-            strips = [np.concatenate([a, b, np.abs(a - b).clip(0, 1 / GAIN) * GAIN], 0) for a, b, _ in pairs]
-            write_png(out / f"preview_{renderer}.png", np.concatenate(strips, 1))
-    lines = ["renderer,view,psnr_db", *(f"{row.renderer},{row.view},{row.psnr:.2f}" for row in rows)]
-    write_text(out / "preview.csv", "\n".join(lines) + "\n")
+    for name, asset in named.items():
+        studio, ours = read_json(asset / "preview.json"), read_image(asset / "preview.png")[..., :3]
+        for renderer, given, drawing in (("cycles", options.cycles, in_blender), ("three", options.three, draw)):
+            if given:
+                theirs = drawing(given, asset, [studio["views"][view] for view in VIEWS], studio)
+                found, picture = compared(ours, theirs, studio)
+                rows += [Beside(name, renderer, view, psnr) for view, psnr in zip(VIEWS, found, strict=True)]
+                write_png(out / f"preview_{name}_{renderer}.png", picture)
+        write_text(out / "preview.csv", table(rows))  # after each asset: some take minutes
     return rows
+
+
+def compared(sheet: np.ndarray, theirs: list[np.ndarray], studio: dict) -> tuple[list[float], np.ndarray]:
+    """PSNR of each view, and one picture: a column a view, ours, theirs, difference. Args: sheet: preview.png."""
+    found, strips = [], []
+    for view, picture in zip(VIEWS, theirs, strict=True):
+        a, (b, on) = cell(sheet, studio, view), shown(picture, studio)
+        found.append(psnr(a, b, on))
+        strips.append(np.concatenate([a, b, np.abs(a - b).clip(0, 1 / GAIN) * GAIN], 0))
+    return found, np.concatenate(strips, 1)
+
+
+def named_asset(asset: Path) -> str:
+    """The name of an asset's mesh. Raises: ArtifactError where a file that is compared is not as it was written."""
+    from stages.core.artifact import intact, read_manifest
+    from stages.core.schemas import ASSET
+
+    provenance, files = read_manifest(asset, ASSET)
+    for name in NEEDED:
+        intact(asset, name, files)
+    return Path(provenance.extra["source_name"]).stem
+
+
+def table(rows: list[Beside]) -> str:
+    """preview.csv."""
+    lines = ["asset,renderer,view,psnr_db", *(f"{row.asset},{row.renderer},{row.view},{row.psnr:.2f}" for row in rows)]
+    return "\n".join(lines) + "\n"
 
 
 def cell(sheet: np.ndarray, studio: dict, view: int) -> np.ndarray:
@@ -134,10 +157,10 @@ def cycles(asset: str, folder: str) -> None:
     scene.cycles.max_bounces, scene.cycles.samples, scene.cycles.pixel_filter_type = 0, SAMPLES, "BOX"
     bpy.ops.import_scene.gltf(filepath=str(Path(asset) / "model.glb"))
     for material in bpy.data.materials:
-        material.cycles.emission_sampling = "NONE"  # what shines lights nothing else, as in the preview and in engines
         for node in material.node_tree.nodes if material.use_nodes else ():
             if node.type == "BSDF_PRINCIPLED":
                 node.distribution = "GGX"
+                only_seen(material.node_tree, node.inputs["Emission Strength"])
     scene.world = bpy.data.worlds.new("world")
     scene.world.use_nodes = True
     nodes, links = scene.world.node_tree.nodes, scene.world.node_tree.links
@@ -155,6 +178,14 @@ def cycles(asset: str, folder: str) -> None:
         image = bpy.data.images.load(scene.render.filepath)
         np.save(f"{folder}/{k}.npy", np.array(image.pixels, np.float32).reshape(job["size"], job["size"], 4)[::-1])
         bpy.data.images.remove(image)
+
+
+def only_seen(tree: Any, strength: Any) -> None:
+    """Let a material shine for the camera alone: a ray that leaves a surface would find its light even at no bounces."""
+    seen = tree.nodes.new("ShaderNodeMath")
+    seen.operation, seen.inputs[1].default_value = "MULTIPLY", strength.default_value
+    tree.links.new(tree.nodes.new("ShaderNodeLightPath").outputs["Is Camera Ray"], seen.inputs[0])
+    tree.links.new(seen.outputs[0], strength)
 
 
 if __name__ == "__main__":
