@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from stages.light.scene import Scene
+from stages.core.color import srgb_decode
+from stages.distill import base, start
+from stages.light import lights
 from stages.prior.colors import WORDS
 from stages.prior.model import VOCABULARY_FILE
 from stages.prior.names import FINISHES, OBJECTS, SUBSTANCES
 from stages.prior.text import Vocabulary
-from stages.report import prior
+from stages.report import ground, prior
 from stages.report.options import PriorReportOptions
 from stages.report.prompts import IDENTIFIED, PROMPTS, Meaning, Prompt
 from stages.report.shapes import SHAPES
@@ -50,19 +52,22 @@ def test_regions_are_told_by_height() -> None:
     gold, oak = Meaning((1.0, 0.9, 0.6), 0.3, 1.0), Meaning((0.7, 0.5, 0.3), 0.6, 0.0)
     prompt = Prompt("oak base and gold top", oak, top=gold)
     maps = np.where((z > 0)[:, None], gold.row(), oak.row()).astype(np.float32)
-    point = np.stack([0 * z, 0 * z, z], -1).astype(np.float32)
-    scene = Scene(np.eye(3), np.array([[0, 1, 2]]), np.zeros((1, 3, 3)))
+    maps[:, :3] = srgb_decode(maps[:, :3])
 
     def right(maps: np.ndarray) -> float:
-        return prior.regions_right(prompt, prior.Baked(maps, point, np.zeros(101, int), point, scene), maps[:, :3])
+        return prior.regions_right(prompt, z, maps)
 
     assert right(maps) == 1 and right(maps[::-1].copy()) == 0
     assert right(np.broadcast_to(oak.row(), (101, 5)).astype(np.float32)) == 0.5
 
 
 def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, less in (("PREVIEW", 64), ("POINTS", 300), ("GIVEN", ("geometry", "full"))):
-        monkeypatch.setattr(prior, name, less)
+    for module, name, less in (
+        (ground, "POINTS", 300), (ground, "TEXELS", 3000), (prior, "GIVEN", ("geometry", "full")), (start, "DRAWS", 3),
+        (start, "LIT_POINTS", 500), (base, "SETTLE_POINTS", 500), (ground, "TURNS", (0.0,)),
+        (ground, "read_lights", lambda _: ([lights.preview_light()], {}, {})),
+    ):  # fmt: skip
+        monkeypatch.setattr(module, name, less)
     ball = tmp_path / "ball.obj"
     trimesh.creation.icosphere(subdivisions=2).export(ball)
     options = PriorReportOptions(mesh=(str(ball),), seeds=2, prompts=1, steps=2, views=1)
@@ -79,5 +84,5 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(line.runs for line in lines)
     assert (tmp_path / "prior.png").stat().st_size > 10_000
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("material.npz")}
-    prior.report_prior(tmp_path, options)
-    assert before == {path: path.stat().st_mtime_ns for path in before}, "a second call works on what is there"
+    again = {prior.carry_out(run, tmp_path, options) for run in prior.plan(options, {"ball": 1.0})}
+    assert before == {path: path.stat().st_mtime_ns for path in again}, "a second call works on what is there"
