@@ -16,6 +16,7 @@ class BakeOptions:
     supersample: int = 1  # samples along each edge of a texel, averaged; a recipe holds nothing finer than one asks for
     preview_size: int = 320  # pixels along each edge of one view of preview.png
     occlusion_rays: int = 128  # of each point whose ambient occlusion is traced
+    relief: float = 1.0  # how strongly what stands out of the surface is shown, as a multiple; 0 none
 
     def __post_init__(self) -> None:
         """Raises: InputError that names the option, what was found and what is expected."""
@@ -23,6 +24,8 @@ class BakeOptions:
             raise InputError(f"size: {self.size} texels; expected one of {', '.join(map(str, SIZES))}")
         if not 1 <= self.supersample <= 8:
             raise InputError(f"supersample: {self.supersample}; expected 1 to 8 samples along each edge of a texel")
+        if not 0 <= self.relief <= 2:
+            raise InputError(f"relief: {self.relief:g}; expected 0 (none) to 2 (twice as deep as the real thing)")
         if not 1 <= self.occlusion_rays <= 1 << 16:
             raise InputError(f"occlusion rays: {self.occlusion_rays}; expected 1 to {1 << 16} a point")
         if not 32 <= self.preview_size <= 2048:

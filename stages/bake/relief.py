@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from stages.bake.raster import Layout, Surface
 from stages.core.parallel import compiled
 from stages.light.normal_maps import NormalMaps, frame
+from stages.material.relief import gentle
 
 FAR = 4.0
 """A neighbouring texel farther off in space than this many of a texel's own steps lies beyond a fold of the chart."""
@@ -61,7 +62,7 @@ def _lean(
     n = points.interpolate(normals)
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
     gradient = np.einsum("nij,nj->ni", carry[points.triangle], slope)
-    gradient -= (gradient * n).sum(1, keepdims=True) * n
+    gradient = gentle(gradient - (gradient * n).sum(1, keepdims=True) * n)
     if own is not None:
         weights = np.c_[points.barycentric, 1 - points.barycentric.sum(1)]
         leaning = own.leaning(n, points.triangle, weights)

@@ -46,6 +46,7 @@ from stages.core.progress import Progress, silent
 from stages.core.schemas import ASSET, MATERIAL, PREP
 from stages.light.scene import Scene
 from stages.material.learnt import LearntMaterial
+from stages.material.relief import bounded
 from stages.material.residual import combined
 
 
@@ -165,7 +166,7 @@ def bake_maps(
     occlusion = occlusion_map(subject.scene, subject.touched, charts, rays, subject.open, progress)
     progress("padding", 0, 1)
     pad(on_chart, maps, occlusion)
-    height = np.ascontiguousarray(maps[..., 5]) if learnt.recipe.has_relief else None
+    height = bounded(maps[..., 5], options.relief) if learnt.recipe.has_relief and options.relief else None
     shares = {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
     return Maps(np.ascontiguousarray(maps[..., :5]), height, occlusion=occlusion), shares
 

@@ -16,6 +16,7 @@ from stages.core.progress import Progress, silent
 from stages.material.directions import WHOLE
 from stages.material.masks import settled
 from stages.material.recipe import Recipe
+from stages.material.relief import gentle
 from stages.material.surface import Surface
 from stages.material.swatch import swatch
 from stages.prior.explain import HEADINGS, explained
@@ -88,6 +89,7 @@ def tile_normals(height: NDArray[np.float32]) -> NDArray[np.float32]:
     size = np.float32(len(height))
     right = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * (size / 2)
     up = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) * (size / 2)
+    right, up = np.moveaxis(gentle(np.stack([right, up], -1)), -1, 0)
     normal = np.stack([-right, -up, np.ones_like(height)], -1)
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
 

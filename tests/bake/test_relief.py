@@ -13,6 +13,7 @@ from stages.bake.stage import Subject, with_normals
 from stages.core.artifact import Artifact, load_npz
 from stages.core.schemas import PREP
 from stages.light.normal_maps import NormalMap, NormalMaps
+from stages.material.relief import STEEPEST
 from tests.bake.examples import Example, grid, one_part, save_prep
 
 SIZE = 512
@@ -119,6 +120,17 @@ def test_no_seam_where_two_charts_meet(tmp_path: Path) -> None:
     across = pairs[chart[pairs[:, 0]] != chart[pairs[:, 1]]]
     assert len(across) > 200
     assert degrees(seen[across[:, 0]], seen[across[:, 1]]).mean() < 1.0
+
+
+def test_a_step_of_height_leans_no_more_than_the_steepest_slope(tmp_path: Path) -> None:
+    """A ledge as high as ten texels are wide, which ends from one texel to the next."""
+    subject = subject_of(tmp_path, "sheet")
+    height = np.zeros((SIZE, SIZE), "f4")
+    height[:, SIZE // 2 :] = 10 / SIZE
+    normal = with_normals(subject, Maps(np.zeros((SIZE, SIZE, 5), "f4"), height=height)).normal
+    assert normal is not None
+    steep = np.linalg.norm(normal[..., :2], axis=-1) / normal[..., 2]
+    assert steep.max() == pytest.approx(STEEPEST, rel=1e-4)
 
 
 def test_flat_stays_flat_and_padding_is_filled(tmp_path: Path) -> None:

@@ -258,8 +258,8 @@ def test_uvs_that_cover_nothing_are_an_error(tmp_path: Path) -> None:
         bake(prep, material, tmp_path / "asset", SMALL)
 
 
-@pytest.mark.parametrize("wrong", [{"size": 1000}, {"size": 256}, {"supersample": 0}, {"preview_size": 1}])
-def test_options_out_of_range_are_refused(wrong: dict[str, int]) -> None:
+@pytest.mark.parametrize("wrong", [{"size": 1000}, {"size": 256}, {"supersample": 0}, {"preview_size": 1}, {"relief": 2.1}])
+def test_options_out_of_range_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError, match="expected"):
         BakeOptions(**wrong)
 
