@@ -20,6 +20,9 @@ SIDES = ("below", "above", "front", "back", "left", "right", "fade")
 DISTANCES = (*SIDES, "stripes", "bands", "spots", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
 
+LEAST = {"edges": 0.08, "crevices": 0.08, "hidden": 0.06}
+"""Least of their fields that counts as an edge, a crease, hidden from the sky: a sphere has none of them."""
+
 CHANCE = ("patches", "streaks", "scratches", "chips")
 """Kinds whose field is noise of deviation 1."""
 
@@ -50,7 +53,9 @@ def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
     if mask.kind in CHANCE:
         return exceeds(value, level, 0.06, lost(at, _chance(mask)))
     rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.9, patch=0.4)
-    amount = 0.04 + 0.16 * mask.wear
+    amount = np.float32(0.04 + 0.16 * mask.wear)
+    if mask.kind in LEAST:  # where there is neither edge nor crease, noise makes none
+        amount = amount * np.clip(value / np.float32(max(level, LEAST[mask.kind])), 0.25, 1)
     return exceeds(value + amount * fbm(at, rough, 5), level, 0.02, amount * lost(at, rough))
 
 
@@ -122,7 +127,8 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
         if mask.kind in SIDES:  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())
             return replace(mask, level=high - mask.share * (high - low))
-        return replace(mask, level=float(np.quantile(value, 1 - np.clip(mask.share, 0, 1))))
+        level = float(np.quantile(value, 1 - np.clip(mask.share, 0, 1)))
+        return replace(mask, level=max(level, LEAST.get(mask.kind, level)))
 
     def layer(old: Layer, number: int) -> Layer:
         at = world.seeded(number)
