@@ -30,6 +30,11 @@ Substance = Callable[[Place], Look]
 """A substance is a function of the place: small, readable, beside its kin in `looks/`."""
 
 
+def over(below: Look, above: Look, cover: Array) -> Look:
+    """One look where it covers, the other elsewhere. Args: cover (P,) 0 … 1."""
+    return Look(*(mix(a, b, cover) for a, b in zip(below, above, strict=True)))
+
+
 STEPS = 256
 
 

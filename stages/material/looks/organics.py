@@ -5,18 +5,19 @@ import numpy as np
 from stages.material.look import Look, mix, palette, shade, tint
 from stages.material.patterns import (
     Spectrum,
+    cells,
     cracks,
     edge,
     fading,
     fbm,
     hexagons,
+    lost,
     marks,
     noise,
     pebbles,
     repeats,
     scales,
     spots,
-    strands,
     threshold,
     tiles,
     warped,
@@ -78,27 +79,36 @@ def horn(at: Place) -> Look:
     return Look(color, np.clip(rough, 0.05, 1), 0.0, 3e-4 * ring + 2e-5 * fibre - 1e-5 * scratch)
 
 
+HAIRS = Spectrum(0.0014, 0.00012, 0.95, (1, 26, 1), 0.35, -0.1, 0.3)
+
+
 def fur(at: Place) -> Look:
-    """A pelt: tapered locks that lie over one another down the body, single hairs in each, dark roots and pale tips."""
+    """A pelt: fine hairs that flow down the body in waves, gathered in pointed locks, dark at the roots, pale at the tips."""
     flat = at.flat
-    under = fbm(flat, Spectrum(0.006, 0.0004, 1.0, (0.4, 4, 1), 0.4, -0.1, 0.4), 1)
-    color, height = palette(0.4 + 0.15 * under, "#4a3520", "#7b5c3b", "#a88558"), -0.003 + 2e-4 * under
-    body = fbm(flat, Spectrum(0.25, 0.02, 0.7, patch=0.4), 2)
-    seen = [fading(width, at.footprint) for width in (0.0006, 0.0003)]
-    hidden = 1 - 0.57 * seen[0] ** 2 - 0.43 * seen[1] ** 2  # of the hairs, of which the bright ones lie on top
-    for k in range(4):
-        lock = marks(at, 0.034 - 0.003 * k, 0.0030 - 0.0002 * k, 11, -np.pi / 2 + 0.1 * (k - 1.5), 0.6, 3 + k, 0.5, 0.4)
-        here = abs(lock.across) < 2
-        hair = strands(at, lock, 0.0030, 5.0, 7 + k)
-        along = np.where(here, lock.along, 0)
-        slope = 0.25 + (np.clip(np.where(here, lock.across, 0), -1, 1) ** 2 - 0.25) * fading(0.0015, at.footprint)
-        t = 0.45 + 0.12 * body + 0.22 * along + 0.3 * (lock.random(1) - 0.5) * here + 0.16 * hair
-        tone = palette(t, "#3a2a1b", "#66492e", "#8c6a45", "#b08f66", "#cdb391")
-        tone = shade(tone, 0.16 * hair + 0.3 * hidden - 0.2 * (slope - 0.25) + 0.05 * (k - 1.5))
-        ragged = lock.cover * np.where(here, np.clip(1.05 - slope - 0.4 * along * along + 0.9 * hair, 0, 1), 0.75)
-        color = mix(color, tint(tone, 0.08 * (lock.random(2) - 0.5) * here), ragged)
-        height = mix(height, -0.002 + 0.0006 * k + 0.0005 * along - 5e-4 * slope + 8e-5 * hair, ragged)
-    return Look(color, np.clip(0.62 + 0.05 * under - 20 * height, 0.2, 1), 0.0, height)
+    sway = [fbm(flat, Spectrum(0.09, 0.02, 0.45), seed) for seed in (1, 2)]
+    flow = flat.moved(np.stack([0.0028 * sway[0], 0.002 * sway[1], 0 * sway[0]]).astype(np.float32))
+    body = fbm(flat, Spectrum(0.2, 0.015, 0.7, (0.8, 1.3, 1), patch=0.4), 3)
+    color = height = np.zeros(len(at), np.float32)
+    for k, (size, share) in enumerate(((0.0085, 1.0), (0.0065, 0.75))):
+        lock = cells(flow, size, 4 + k, 0.95, (1, 3.4, 1))
+        seen = fading(0.6 * size, at.footprint)
+        x, y, _ = lock.offset
+        fan = x + (lock.random(1) - 0.5) * 0.5 * y + np.float32(0.5 / size) * x * y  # locks close towards their tips
+        own = np.stack([fan, flow.p[1], 0.3 * lock.random(2) + 0 * y]).astype(np.float32)
+        hairs = Place(own, at.uv, at.face, at.footprint, (0, at.period[1], 0), at.seed)
+        strand = fbm(hairs, HAIRS, 6 + k)
+        hidden = lost(hairs, HAIRS)
+        tip = np.clip(0.5 - y / (1.3 * size), 0, 1)
+        ragged = lock.border + np.float32(0.12 * size) * (0.3 + tip) * strand
+        edge_of = threshold(ragged, 0.0004 + 0.0014 * tip, 0.0011) * seen + 0.72 * (1 - seen)
+        tone = 0.42 + 0.30 * (tip - 0.5) * seen + 0.10 * body + 0.22 * (lock.random(3) - 0.5) * seen + 0.13 * strand
+        here = share * edge_of if k else np.ones(len(at), np.float32)
+        layer = shade(palette(tone, "#2e2015", "#573c25", "#86633e", "#b08b5e", "#d6bb92"),
+                      0.17 * strand + 0.36 * hidden**2 - 0.55 * (1 - edge_of))  # fmt: skip
+        color = layer if not k else mix(color, layer, here)
+        height = mix(height, 6e-4 * k + 7e-4 * (edge_of - 0.6) + 5e-4 * (tip - 0.5) * seen + 5e-5 * strand, here)
+    color = tint(color, 0.03 * sway[0] + 0.03 * body)
+    return Look(color, np.clip(0.6 - 120 * (height - 2e-4), 0.25, 1), 0.0, height - 3e-4)
 
 
 def feathers(at: Place) -> Look:
@@ -139,22 +149,22 @@ def feathers(at: Place) -> Look:
 
 
 def bread(at: Place) -> Look:
-    """The crumb of a white loaf: bubbles of every size with thin shining walls, darker in their depth."""
-    bent = warped(at, 0.0012, 0.008, 1, 3)
-    fine = fbm(at, Spectrum(0.002, 0.00015, 1.05, tails=0.4, skew=-0.2, patch=0.4), 2)
-    wide = fbm(at, Spectrum(0.06, 0.004, 0.8), 3)
-    color = palette(0.6 + 0.08 * wide + 0.10 * fine, "#d3b688", "#e3cda3", "#efe0c0", "#f4e9d2")
-    height = 6e-5 * fine + 3e-4 * wide
+    """The crumb of a white loaf: bubbles of every size, drawn a little up as it rose, thin pale walls, dusk in their depth."""
+    bent = warped(warped(at, 0.0009, 0.012, 1, 2), 0.00012, 0.0016, 2, 2)
+    fine = fbm(at, Spectrum(0.0016, 0.00012, 1.0, tails=0.3, skew=-0.1, patch=0.4), 3)
+    wide = fbm(at, Spectrum(0.05, 0.004, 0.8), 4)
+    color = palette(0.6 + 0.06 * wide + 0.08 * fine, "#e0c896", "#ecdab2", "#f3e6c8", "#f7eed8")
+    height = 4e-5 * fine + 3e-4 * wide
     for k, (size, radius, share) in enumerate(
-        ((0.0016, 0.0006, 0.8), (0.0035, 0.0013, 0.75), (0.0075, 0.0028, 0.85), (0.016, 0.0062, 0.6))
+        ((0.0013, 0.00062, 0.95), (0.0024, 0.0012, 0.9), (0.0050, 0.0025, 0.75), (0.0115, 0.0056, 0.6))
     ):
-        hole = spots(bent, size, (0.5 * radius, 1.15 * radius), share, 4 + k, (1, 0.8, 1))
+        hole = spots(bent, size, (0.55 * radius, 1.15 * radius), share, 5 + k, (1, 1.3, 1))
         deep = np.clip(hole.inside / np.maximum(hole.radius, 1e-5), 0, 1)
-        floor = palette(0.6 - 0.4 * deep + 0.08 * fine, "#a98557", "#c8a877", "#dec398")
-        rim = np.exp(-np.clip(-hole.inside, 0, 1) / (0.12 * radius)) * (1 - hole.cover) * fading(radius, at.footprint)
-        color = mix(shade(color, 0.08 * rim), floor, 0.85 * hole.cover)
-        height = height - hole.cover * 0.6 * radius * np.sqrt(deep) + 0.05 * radius * rim
-    return Look(tint(shade(color, 0.04 * fine), 0.03 * wide), np.clip(0.88 + 0.04 * fine, 0, 1), 0.0, height + 5e-4)
+        rim = np.exp(-((hole.inside / (0.16 * radius)) ** 2)) * fading(radius, at.footprint)
+        floor = palette(0.95 - 1.0 * np.sqrt(deep) + 0.07 * fine, "#a9804a", "#c39c64", "#d8b982", "#e8d3a8")
+        color = mix(shade(color, 0.05 * rim), floor, hole.cover * (0.4 + 0.13 * k))
+        height = height - hole.cover * (0.2 + 0.08 * k) * radius * deep * (2 - deep) + 0.03 * radius * rim
+    return Look(tint(shade(color, 0.05 * fine), 0.03 * wide), np.clip(0.82 + 0.04 * fine, 0, 1), 0.0, height + 5e-4)
 
 
 def chocolate(at: Place) -> Look:

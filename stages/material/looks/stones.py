@@ -396,12 +396,12 @@ def gravel(at: Place) -> Look:
 def jade(at: Place) -> Look:
     """Felted fibres of nephrite, polished: green clouds in pale green, a fine web of lighter veins."""
     bent = warped(at, 0.005, 0.06, 1, 4)
-    cloud = fbm(bent, Spectrum(0.09, 0.001, 0.72, (1, 1.5, 1), patch=0.4), 3)
-    vein = cracks(bent, 0.045, 0.0009, 0.4, 4, 2)
+    cloud = fbm(bent, Spectrum(0.11, 0.001, 0.62, (1, 1.5, 1), patch=0.4), 3)
+    vein = cracks(bent, 0.06, 0.0006, 0.05, 4, 2)
     fleck = fbm(at, Spectrum(0.004, 0.0003, 1.0, (1, 1.7, 1), tails=0.5, patch=0.5), 5)
     dark = masked(bent, Spectrum(0.03, 0.0006, 0.85, patch=0.5), 0.05, 6, 0.5)
-    color = palette(0.5 + 0.2 * cloud, "#2b6a44", "#41815a", "#5d9a6e", "#82b188", "#a9c8a2")
-    color = mix(color, palette(0.5 + 0.2 * fleck, "#b9d3b0", "#dbe7cd"), 0.45 * vein.cover + 0.25 * np.exp(-vein.near / 0.0015))
+    color = palette(0.5 + 0.2 * cloud, "#2a6b45", "#3a7c54", "#4f9067", "#6ba47c", "#8fbb95")
+    color = mix(color, palette(0.5 + 0.2 * fleck, "#b9d3b0", "#dbe7cd"), 0.3 * vein.cover + 0.15 * np.exp(-vein.near / 0.0025))
     color = tint(shade(color, 0.09 * fleck - 0.3 * dark), 0.06 * noise(bent, 0.04, 7), 0.03 * cloud)
     return Look(color, 0.11 + 0.05 * vein.cover + 0.015 * abs(fleck) + 0.03 * dark, 0.0, 2e-6 * fleck - 5e-6 * vein.cover)
 

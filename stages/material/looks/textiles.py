@@ -13,8 +13,10 @@ from stages.material.patterns import (
     Spectrum,
     Weave,
     cells,
+    edge,
     fading,
     fbm,
+    hexagons,
     knit,
     laid,
     line,
@@ -241,20 +243,19 @@ def wool_knit(at: Place) -> Look:
 
 
 def felt(at: Place) -> Look:
-    """Wool pressed without a thread: fibres in every direction, soft clouds, balls of fluff."""
+    """Wool pressed without a thread: heathered grey of white, grey and black fibres that lie every way, soft clouds, fluff."""
     flat = at.flat
-    cloud = fbm(warped(flat, 0.002, 0.012, 1, 3), Spectrum(0.03, 0.001, 0.9, tails=0.2, patch=0.5), 2)
-    fine = fbm(warped(flat, 0.0004, 0.0016, 3, 2), Spectrum(0.002, 0.00012, 1.0, tails=0.5, skew=0.1, patch=0.5), 4)
-    color = palette(0.5 + 0.06 * cloud + 0.10 * fine, "#4a5a52", "#5c6d63", "#708377")
-    height = 4e-5 * cloud + 3e-5 * fine
-    for k, tone in enumerate(("#4c5d54", "#66786d", "#87998d")):
-        hair = marks(at, 0.009 - 0.002 * k, 0.00022, 9, 1.1 * k, 6.28, 6 + k, 0.6, 0.9)
-        color, height = (
-            mix(color, shade(palette(0 * fine, tone), 0.3 * (hair.random(1) - 0.5)), 0.5 * hair.cover),
-            height + 4e-5 * hair.cover,
-        )
-    color = tint(shade(color, 0.03 * cloud + 0.06 * fine), 0.05 * noise(flat, 0.01, 12))
-    return Look(color, np.clip(0.95 + 0.03 * fine, 0, 1), 0.0, height - 1e-4)
+    bent = warped(flat, 0.0012, 0.008, 1, 3)
+    cloud = fbm(bent, Spectrum(0.022, 0.0012, 0.8, patch=0.3), 2)
+    fine = fbm(warped(flat, 0.0003, 0.0012, 3, 2), Spectrum(0.0012, 0.0001, 1.0, tails=0.4, patch=0.3), 4)
+    color, height = palette(0.5 + 0.05 * cloud + 0.12 * fine, "#6f6e6b", "#84837f", "#989792"), 4e-5 * cloud + 5e-6 * fine
+    lain = Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed)
+    for k, share in enumerate((0.65, 0.55, 0.5)):
+        hair = marks(lain, 0.0042, 0.00013, 16, 1.1 * k, 6.28, 6 + k, 0.5, 0.7)
+        tone = each(hair.random(1), fading(0.00013, at.footprint), "#4a4947", "#8c8b87", "#7b7a76", "#a7a6a1", "#d6d5d0")
+        color, height = mix(color, tone, share * hair.cover), height + 9e-6 * hair.cover
+    color = tint(shade(color, 0.04 * cloud + 0.06 * fine), 0.03 * noise(flat, 0.01, 12))
+    return Look(color, np.clip(0.95 + 0.03 * fine + 0.01 * cloud, 0, 1), 0.0, height - 5e-5)
 
 
 def velvet(at: Place) -> Look:
@@ -381,13 +382,44 @@ def straw(at: Place) -> Look:
     return Look(color, np.clip(0.58 + 0.05 * grit - 6 * height, 0, 1), 0.0, height)
 
 
+def lace(at: Place) -> Look:
+    """Cotton lace over a dark lining: a net of hexagons, flowers of close stitching with a corded outline, trailing stems."""
+    flat = strayed(at.flat, 0.002, 0.00025, 1)
+    net = hexagons(flat, 0.0026, 2)
+    mesh = line(net.border, 0.00022, at.footprint)
+    mesh = 0.3 + (mesh - 0.3) * net.seen
+    bed = cells(flat, 0.046, 3, 0.45, (1, 1, 40))
+    x, y, _ = bed.offset
+    angle = np.arctan2(y, x) + np.float32(6.28) * bed.random(1)
+    away, petals = np.hypot(x, y), np.where(bed.random(2) < 0.5, 5, 6)
+    wave = abs(np.cos(0.5 * petals * angle))
+    size = np.float32(0.0150) + np.float32(0.0045) * bed.random(3)
+    outline = size * (0.52 + 0.48 * wave**0.7) - away
+    heart, eye = 0.26 * size - away, abs(away - 0.34 * size)
+    stem = abs(fbm(flat, Spectrum(0.05, 0.025, 0.4), 4)) * np.float32(0.011)
+    leaf = stem - np.float32(0.0028) * np.clip(fbm(flat, Spectrum(0.012, 0.006, 0.6), 5) - 0.35, 0, 1)
+    stitch = weave(flat, 0.0005, "plain", 0.8, 6)
+    ridge = (stitch.height - 0.5) * stitch.seen
+    cord = np.maximum.reduce([line(outline, 0.00055, at.footprint), line(heart, 0.0004, at.footprint),
+                              line(stem, 0.0005, at.footprint) * (outline < 0)])  # fmt: skip
+    holes = (abs(eye) < 0.0011) * (np.cos(14 * angle) > 0.1) * fading(0.001, at.footprint)
+    close = np.maximum(edge(outline, at.footprint) * (1 - 0.9 * holes), edge(-leaf, at.footprint) * (outline < 0))
+    cover = np.maximum.reduce([mesh, cord, 0.93 * close])
+    fibre = fbm(flat, Spectrum(0.0012, 0.0001, 1.0, tails=0.3, patch=0.4), 7)
+    thread = palette(0.6 + 0.14 * fibre + 0.2 * ridge, "#cfc9ba", "#e2ddd0", "#efebe0", "#f6f3ea")
+    thread = shade(thread, 0.05 * fibre + 0.25 * ridge * close - 0.12 * (mesh > close))
+    color = mix(palette(0.5 + 0.1 * fibre, "#3c3630", "#4a433c"), thread, cover)
+    height = 1.5e-4 * mesh + 2.2e-4 * close * (1 + 0.4 * ridge) + 3e-4 * cord - 2.5e-4
+    return Look(color, np.clip(0.86 + 0.03 * fibre, 0, 1), 0.0, height, cover)
+
+
 LOOKS = {
     "denim": denim, "fabric": fabric, "canvas": canvas, "linen": linen, "burlap": burlap, "wool": wool, "wool knit": wool_knit,
     "felt": felt, "velvet": velvet, "silk": silk, "carpet": carpet, "corduroy": corduroy, "towel": towel, "tartan": tartan,
-    "rope": rope, "wicker": wicker, "straw": straw,
+    "rope": rope, "wicker": wicker, "straw": straw, "lace": lace,
 }  # fmt: skip
 METRES = {
     "denim": 0.12, "fabric": 0.08, "canvas": 0.12, "linen": 0.08, "burlap": 0.2, "wool": 0.12, "wool knit": 0.15, "felt": 0.06,
     "velvet": 0.25, "silk": 0.08, "carpet": 0.25, "corduroy": 0.12, "towel": 0.12, "tartan": 0.26, "rope": 0.2, "wicker": 0.3,
-    "straw": 0.4,
+    "straw": 0.4, "lace": 0.14,
 }  # fmt: skip

@@ -2,6 +2,7 @@
 boards of any of them. The grain is the second axis of p."""
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -93,13 +94,13 @@ def timber(at: Place, kind: Timber) -> Look:
     width = at.period[0]
     if width:  # rings bend back so that the square repeats
         x = np.float32(width / (2 * math.pi)) * np.sin(np.float32(2 * math.pi / width) * x)
-    lazy = at if at.period[1] else at.moved(np.stack([0 * y, -0.85 * y, 0 * y]))  # figure drawn out along the grain
+    lazy = drawn_out(at, 0.15)
     knot = knots(at, kind.knots) if kind.knots else None
     wander = fbm(lazy, Spectrum(0.12, 0.015, 0.38, (1, 6, 1)), 1)
-    deep = fbm(at, Spectrum(0.2, 0.05, 0.5, (1, 5, 1)), 2)
+    deep = fbm(lazy, Spectrum(0.2, 0.05, 0.5, (1, 5, 1)), 2)
     radius = np.hypot(x + np.float32(0.04) + kind.figure * wander, z + np.float32(0.11) + kind.figure * deep)
     radius = radius + (knot.bend if knot else 0)
-    years = radius / kind.ring + 0.8 * noise(at, 0.03, 3, (1, 8, 1))
+    years = radius / kind.ring + 0.8 * noise(at, 0.03, 3, (1, 8, 1)) + slant(at)
     ring = years - np.floor(years)
     seen = fading(kind.ring, at.footprint)
     season = 0.31 + (ring**2 * threshold(1 - ring, 0.06, 0.06) - 0.31) * seen  # slow into latewood, sharp back into spring
@@ -126,6 +127,30 @@ def timber(at: Place, kind: Timber) -> Look:
         color = shade(color, -0.9 * knot.rim - 12 * knot.bend)
     color = tint(color, 0.03 * noise(at, 0.05, 8, (1, 6, 1)) + 0.012 * band)
     return Look(color, rough, 0.0, 2e-5 * fibre - 1.2e-4 * pore - 4e-5 * season)
+
+
+def drawn_out(at: Place, share: float) -> Place:
+    """The place with its second axis, the grain, counting for a share of itself: what varies there does so slowly. Where it
+    must repeat, it goes to and fro instead."""
+    y, length = at.p[1], at.period[1]
+    slow = np.float32(share) * y
+    if length:
+        slow = np.float32(share * length / (2 * math.pi)) * np.sin(np.float32(2 * math.pi / length) * y)
+    moved = at.moved(np.stack([0 * y, slow - y, 0 * y]))
+    return replace(moved, period=(at.period[0], 0.0, at.period[2]))
+
+
+TAPER = 11.0, 22.0
+"""Rings that a board crosses in a metre along the grain and across it, because trunks taper and saws do not follow them."""
+
+
+def slant(at: Place) -> Array:
+    """Years by which the rings are shifted, (P,): a whole number over a period, so that arches stay open and yet repeat."""
+    x, y, _ = at.p
+    across, along = at.period[0], at.period[1]
+    slope = round(TAPER[0] * along) / along if along else TAPER[0]
+    tilt = round(TAPER[1] * across) / across if across else 0.0
+    return np.float32(slope) * y + np.float32(tilt) * x
 
 
 def weathered(at: Place) -> Look:
