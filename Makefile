@@ -15,8 +15,7 @@ THREE   := $(VENV)/.three
 # one job: make asset MESH=chair.obj PROMPT="a carved oak chair" OUT=assets/chair
 MESH   ?=
 PROMPT ?=
-NAME   ?= $(basename $(notdir $(MESH)))
-OUT    ?= assets/$(NAME)
+OUT    ?=
 # a folder of jobs, each a folder with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
 JOBS   ?= jobs
 # what `make export` writes every asset of JOBS for
@@ -31,8 +30,12 @@ CONDITIONS_OPTIONS ?=
 DISTILL_OPTIONS    ?=
 BAKE_OPTIONS       ?=
 
+# recipes read all of these from the environment, so that names may hold blanks, quotes and signs
+export MESH PROMPT OUT JOBS FOR PREP_OPTIONS CONDITIONS_OPTIONS DISTILL_OPTIONS BAKE_OPTIONS
+OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" \
+	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
+
 .DELETE_ON_ERROR:
-.SECONDARY:
 .PHONY: help setup demo test campaign hostile lint asset batch export bench beside clean
 
 help:  ## show this list
@@ -46,10 +49,8 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	$(INSTALL) --editable '.[dev,report]'
 	@echo "compiling kernels once, for all runs to come"
 	@tiny=$$(mktemp -d) && $(RUN)/python examples/urn.py $$tiny/urn.obj && \
-	$(DREAMMAT) prep $$tiny/urn.obj -o $$tiny/prep.npz -q && \
-	$(DREAMMAT) conditions $$tiny/prep.npz -o $$tiny/conditions --views 1 --size 64 -q && \
-	$(DREAMMAT) distill $$tiny/conditions --prompt copper --steps 1 -o $$tiny/material.npz -q && \
-	$(DREAMMAT) bake $$tiny/prep.npz $$tiny/material.npz -o $$tiny/asset --size 512 -q && rm -r $$tiny
+	$(DREAMMAT) run $$tiny/urn.obj --prompt copper -o $$tiny -q --with conditions "--views 1 --size 64" \
+		--with distill "--steps 1" --with bake "--size 512" && rm -r $$tiny
 	@touch $@
 
 # the packages of --guidance sd, which its tests run on a tiny model
@@ -69,56 +70,37 @@ $(CHROMIUM): | $(VENV)/.ready
 	echo "no chromium and chromedriver here: the tests of report.html in a browser will be skipped"
 	@touch $@
 
-# ------------------------------------------------------------------- the stages, one pattern rule each
-# NAME/mesh.* and NAME/prompt.txt -> prep.npz -> conditions/ -> material.npz -> asset/
-# `prep` always runs: it hashes the mesh, and leaves prep.npz untouched when that is up to date.
-
-MESHES = obj glb gltf fbx usdz usdc usda usd ply stl off
-
-%/prep.npz: FORCE | $(VENV)/.ready
-	@mesh=$$(cat '$*/mesh.path' 2>/dev/null || ls $(foreach type,$(MESHES),'$*'/*.$(type)) 2>/dev/null | head -n 1); \
-	[ -n "$$mesh" ] || { echo "$*: no mesh there ($(MESHES))" >&2; exit 1; }; \
-	$(DREAMMAT) prep "$$mesh" -o $@ $(PREP_OPTIONS)
-
-%/conditions/manifest.json: %/prep.npz
-	$(DREAMMAT) conditions $< -o $(@D) $(CONDITIONS_OPTIONS)
-	@touch $@
-
-%/material.npz: %/conditions/manifest.json %/prompt.txt
-	$(DREAMMAT) distill $(<D) --prompt "$$(cat $*/prompt.txt)" -o $@ $(DISTILL_OPTIONS)
-	@touch $@
-
-%/asset/bake.json: %/prep.npz %/material.npz
-	$(DREAMMAT) bake $^ -o $(@D) $(BAKE_OPTIONS)
-	@touch $@
-
-.PHONY: FORCE
-FORCE:
-
 # ------------------------------------------------------------------------------------------ what people type
 
 demo/urn.obj: examples/urn.py | $(VENV)/.ready
 	$(RUN)/python $< $@
 
 demo: demo/urn.obj  ## texture a mesh made by the project itself, from nothing to demo/asset
-	@printf 'weathered copper with verdigris in the crevices' > demo/prompt.txt
-	$(MAKE) demo/asset/bake.json CONDITIONS_OPTIONS='--views 32'
+	$(DREAMMAT) run $< --prompt "weathered copper with verdigris in the crevices" -o demo --with conditions "--views 32"
 	@echo "look at demo/asset/preview.png; the model is demo/asset/model.glb"
 
 asset: $(VENV)/.ready  ## one mesh and prompt: make asset MESH=chair.obj PROMPT="a carved oak chair"
-	@[ -n "$(MESH)" ] && [ -n "$(PROMPT)" ] || { echo 'usage: make asset MESH=chair.obj PROMPT="a carved oak chair"' >&2; exit 2; }
-	@mkdir -p "$(OUT)"
-	@printf '%s' "$(PROMPT)" | cmp -s - "$(OUT)/prompt.txt" || printf '%s' "$(PROMPT)" > "$(OUT)/prompt.txt"
-	@printf '%s' "$(MESH)" | cmp -s - "$(OUT)/mesh.path" || printf '%s' "$(MESH)" > "$(OUT)/mesh.path"
-	$(MAKE) "$(OUT)/asset/bake.json"
+	@[ -n "$$MESH" ] && [ -n "$$PROMPT" ] || { echo 'usage: make asset MESH=chair.obj PROMPT="a carved oak chair"' >&2; exit 2; }
+	@name=$$(basename "$$MESH") && $(DREAMMAT) run "$$MESH" --prompt "$$PROMPT" -o "$${OUT:-assets/$${name%.*}}" $(OPTIONS)
 
+# a target for each folder, by its number, since a target's name cannot hold what a folder's may
 batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
-	$(MAKE) $(patsubst %/prompt.txt,%/asset/bake.json,$(wildcard $(JOBS)/*/prompt.txt))
+	@count=$$($(FOLDERS) | wc -l); [ $$count -gt 0 ] || { echo "$$JOBS: no folder there holds a prompt.txt" >&2; exit 1; }; \
+	$(MAKE) --no-print-directory $$(seq -f job-%.0f $$count)
+
+FOLDERS = find "$$JOBS" -mindepth 2 -maxdepth 2 -name prompt.txt 2>/dev/null | sort
+MESHES  = obj|glb|gltf|fbx|usdz|usdc|usda|usd|ply|stl|off
+
+job-%:
+	@prompt=$$($(FOLDERS) | sed -n '$*p'); folder=$$(dirname "$$prompt"); \
+	mesh=$$(find "$$folder" -maxdepth 1 -type f | grep -iE '\.($(MESHES))$$' | sort | head -n 1); \
+	[ -n "$$mesh" ] || { echo "$$folder: no mesh there ($(MESHES))" >&2; exit 1; }; \
+	$(DREAMMAT) run "$$mesh" --prompt "$$(cat "$$prompt")" -o "$$folder" $(OPTIONS)
 
 export: $(VENV)/.ready  ## every asset of JOBS for another program: make export JOBS=jobs FOR=unreal
-	@for manifest in $(JOBS)/*/asset/bake.json; do \
-	[ -f "$$manifest" ] || { echo "$(JOBS): no folder there holds an asset; make batch JOBS=$(JOBS)" >&2; exit 1; }; \
-	job=$${manifest%/asset/bake.json}; $(DREAMMAT) export "$$job/asset" -o "$$job/$(FOR)" --for $(FOR) || exit; done
+	@for manifest in "$$JOBS"/*/asset/bake.json; do \
+	[ -f "$$manifest" ] || { echo "$$JOBS: no folder there holds an asset; make batch JOBS=$$JOBS" >&2; exit 1; }; \
+	job=$${manifest%/asset/bake.json}; $(DREAMMAT) export "$$job/asset" -o "$$job/$$FOR" --for "$$FOR" || exit; done
 
 test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION) $(CHROMIUM)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
@@ -134,7 +116,7 @@ lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/mypy
 
 bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light transport, beside Mitsuba 3 and Cycles
-	$(MAKE) demo/prep.npz
+	$(DREAMMAT) prep $< -o demo/prep.npz
 	$(DREAMMAT) report conditions demo/prep.npz -o bench $$(cat $(MITSUBA) $(CYCLES))
 	@echo "look at bench/conditions.png"
 	$(MAKE) beside

@@ -5,6 +5,7 @@ elsewhere it is a plain line now and then. NO_COLOR is honoured.
 """
 
 import dataclasses
+import itertools
 import json
 import sys
 import time
@@ -37,6 +38,10 @@ class Common:
     as_json: bool
     dry_run: bool
 
+    def flags(self) -> list[str]:
+        """The same options, for another command."""
+        return [f"--{name.removeprefix('as_').replace('_', '-')}" for name, on in dataclasses.asdict(self).items() if on]
+
 
 def common_options(function: Callable) -> Callable:
     """Add --force, --quiet, --verbose, --json and --dry-run, and pass them on as one `Common`."""
@@ -50,7 +55,7 @@ def common_options(function: Callable) -> Callable:
         [
             click.option("-f", "--force", is_flag=True, help="Redo the work even if the output is up to date."),
             click.option("-q", "--quiet", is_flag=True, help="Only errors."),
-            click.option("-v", "--verbose", is_flag=True, help="More of what is found and done."),
+            click.option("-v", "--verbose", is_flag=True, help="More of what is found and done, and the seconds of each part."),
             click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout."),
             click.option("--dry-run", is_flag=True, help="Say what would be done, and stop."),
         ]
@@ -106,10 +111,17 @@ class reporter:
         self.tasks: dict[str, Any] = {}
         self.started: dict[str, tuple[float, int]] = {}
         self.told = time.monotonic()
+        self.parts: list[tuple[str, float]] = []
+        """What was begun, and when."""
 
     def __enter__(self) -> Progress:
         if self.common.quiet:
             return silent
+        shown = self.begin_showing()
+        return self.timed(shown) if self.common.verbose else shown
+
+    def begin_showing(self) -> Progress:
+        """What shows progress where stderr goes to."""
         if not sys.stderr.isatty():
             return self.line
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
@@ -117,9 +129,22 @@ class reporter:
         self.bar.start()
         return self.draw
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *error: object) -> None:
         if self.bar:
             self.bar.stop()
+        for (label, start), (_, after) in itertools.pairwise([*self.parts, ("", time.monotonic())]):
+            click.echo(f"{after - start:8.1f} s  {label}", err=True)
+
+    def timed(self, shown: Progress) -> Progress:
+        """The same, and it notes when each part began."""
+
+        def call(what: str, done: int, total: int) -> None:
+            label = what.split(" (")[0]
+            if not self.parts or self.parts[-1][0] != label:
+                self.parts.append((label, time.monotonic()))
+            shown(what, done, total)
+
+        return call
 
     def draw(self, what: str, done: int, total: int) -> None:
         """Progress on a terminal."""

@@ -1,5 +1,6 @@
 """The `dreammat` command. Each subcommand lives in a file of its own and is imported only when it is called."""
 
+import difflib
 import importlib
 import os
 import signal
@@ -11,6 +12,7 @@ import click
 from stages.core.errors import DreammatError
 
 COMMANDS = {
+    "run": "Texture a mesh: the next four commands in one call.",
     "prep": "Read, check, mend and unwrap a mesh.",
     "conditions": "Ray-trace geometry and light around the mesh.",
     "distill": "Optimise the material for a prompt.",
@@ -20,6 +22,8 @@ COMMANDS = {
     "report": "Measure speed against error.",
     "train": "Train the diffusion models.",
     "eval": "Measure assets: CLIP score and FID.",
+    "doctor": "Check this machine, and say how to mend what is wrong.",
+    "completion": "Print what a shell needs to complete commands and options.",
 }
 
 INTERRUPTED = 130
@@ -33,7 +37,9 @@ class LazyGroup(click.Group):
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
         if name not in COMMANDS:
-            return None
+            close = difflib.get_close_matches(name, COMMANDS, 1)
+            hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(COMMANDS)}"
+            raise click.UsageError(f"No such command {name!r}: {hint}", context)
         return importlib.import_module(f"dreammat_cli.{name}").command
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
@@ -47,11 +53,15 @@ def cli() -> None:
     """Physically based materials for untextured meshes, from a text prompt.
 
     \b
+    dreammat run        MESH --prompt TEXT          -o FOLDER/
+
+    does all that is needed to texture a mesh; it is these four in one:
+
+    \b
     dreammat prep       MESH                        -o PREP.npz
     dreammat conditions PREP.npz                    -o CONDITIONS/
     dreammat distill    CONDITIONS/ --prompt TEXT   -o MATERIAL.npz
     dreammat bake       PREP.npz MATERIAL.npz       -o ASSET/
-    dreammat export     ASSET/ --for TARGET         -o FOLDER/
 
     Every command can be stopped and run again: it continues, or says that its output is up to date.
 

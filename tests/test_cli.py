@@ -1,6 +1,7 @@
 """The command line as a user meets it: help, plans, one-line errors, exit codes, and nothing half-written."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -36,7 +37,7 @@ def mesh(tmp_path: Path) -> Path:
     return path
 
 
-STAGES = ("prep", "conditions", "distill", "bake", "export")
+STAGES = ("run", "prep", "conditions", "distill", "bake", "export", "doctor", "completion")
 TRAINING = ("train prior", "train pictures", "train controlnet")
 
 
@@ -100,6 +101,11 @@ def test_json_is_all_that_stdout_holds(mesh: Path, tmp_path: Path) -> None:
         ("train", "pictures", "m", "-o", "p", "--shard", "3/2"),
         ("train", "pictures", "m", "-o", "p", "--shard", "half"),
         ("nonsense",),
+        ("run", "MESH", "-o", "r"),
+        ("run", "MESH", "-o", "r", "--prompt", "oak", "--with", "paint", "--size 512"),
+        ("run", "MESH", "-o", "r", "--prompt", "oak", "--with", "prep", "--up 'z"),
+        ("run", "MESH", "-o", "r", "--prompt", "oak", "--with", "bake", "--sise 512"),
+        ("completion", "tcsh"),
     ],
 )
 def test_wrong_usage(arguments: tuple[str, ...], tmp_path: Path) -> None:
@@ -153,3 +159,36 @@ def test_full_disk(mesh: Path) -> None:
 
     with pytest.raises(OutputError, match="no space"), written_atomically(mesh.with_name("a.txt")):
         full.write_text("x" * 100_000)
+
+
+def test_a_command_that_is_not_there_is_guessed(tmp_path: Path) -> None:
+    expect_error(dreammat("bkae", cwd=tmp_path), USAGE, "'bkae'", "did you mean 'bake'")
+    expect_error(dreammat("prep", "--texture-sise", "64", cwd=tmp_path), USAGE, "--texture-size")
+
+
+def test_run_hands_each_stage_its_options(mesh: Path, tmp_path: Path) -> None:
+    options = (("conditions", "--views 3 --env night"), ("bake", "--size 512"), ("bake", "--supersample 2"))
+    further = [word for stage, text in options for word in ("--with", stage, text)]
+    planned = dreammat("run", mesh, "--prompt", "oak", "-o", "it's #1 (50%)", *further, "--dry-run", "--json", cwd=tmp_path)
+    prep, conditions, distill, bake = map(json.loads, planned.stdout.splitlines())
+    assert prep["output"] == "it's #1 (50%)/prep.npz" and distill["prompt"] == "oak"
+    assert (conditions["views"], conditions["env"]) == (3, ["night"])
+    assert (bake["size"], bake["supersample"]) == (512, 2)
+    assert [p.name for p in tmp_path.iterdir()] == ["triangle.obj"]
+
+
+def test_verbose_tells_the_seconds_of_each_part(mesh: Path, tmp_path: Path) -> None:
+    told = dreammat("prep", mesh, "-o", tmp_path / "prep.npz", "-v").stderr.splitlines()
+    assert told and all(line.split()[1] == "s" and float(line.split()[0]) >= 0 for line in told)
+
+
+@pytest.mark.parametrize("shell", ("bash", "zsh", "fish"))
+def test_completion_prints_a_script(shell: str) -> None:
+    assert f"{shell}_complete" in dreammat("completion", shell).stdout
+
+
+def test_options_complete() -> None:
+    asked = {"_DREAMMAT_COMPLETE": "bash_complete", "COMP_WORDS": "dreammat bake --super", "COMP_CWORD": "2"}
+    code = "import sys; sys.argv[0] = 'dreammat'; from dreammat_cli.main import main; main()"
+    result = subprocess.run([sys.executable, "-c", code], env=os.environ | asked, capture_output=True, text=True, check=False)
+    assert result.stdout.strip() == "plain,--supersample"

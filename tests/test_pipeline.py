@@ -70,6 +70,19 @@ def test_every_stage_is_then_up_to_date(whole: tuple[Path, dict[str, float]]) ->
     assert fingerprint(whole[0]) == before
 
 
+def test_one_call_gives_the_same_bytes(whole: tuple[Path, dict[str, float]], tmp_path: Path) -> None:
+    folder = tmp_path / "it's #1 (50%)"
+    folder.mkdir()
+    shutil.copy(whole[0] / "mesh.obj", folder)
+    commands = stages(folder)
+    further = []
+    for name, first in (("prep", "--texture-size"), ("conditions", "--views"), ("distill", "--steps"), ("bake", "--size")):
+        options = commands[name][commands[name].index(first) :]
+        further += ["--with", name, " ".join(options)]
+    run(["run", str(folder / "mesh.obj"), "--prompt", "red plastic", "-o", str(folder), *further])
+    assert fingerprint(folder) == fingerprint(whole[0])
+
+
 def test_killed_at_random_and_run_again_ends_in_the_same_bytes(
     whole: tuple[Path, dict[str, float]], tmp_path: Path
 ) -> None:

@@ -1,0 +1,54 @@
+"""dreammat run: the four stages, one after the other, in one folder."""
+
+import shlex
+from importlib import import_module
+from pathlib import Path
+
+import click
+
+from dreammat_cli.common import INPUT, Common, common_options
+
+STAGES = ("prep", "conditions", "distill", "bake")
+
+
+@click.command(
+    epilog='Example: dreammat run chair.obj --prompt "a carved oak chair" -o chair --with conditions "--views 64"'
+)
+@click.argument("mesh", type=INPUT, metavar="MESH")
+@click.option("--prompt", required=True, metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
+@click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER",
+              help="The folder to write: prep.npz, conditions/, material.npz, and the result in asset/.")
+@click.option("--with", "further", type=(click.Choice(STAGES), str), multiple=True, metavar="STAGE OPTIONS",
+              help='Options of a stage, as dreammat STAGE --help lists them: --with bake "--size 4096". Repeat for more.')
+@common_options
+def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str], ...], common: Common) -> None:
+    """Texture MESH: prep, conditions, distill and bake in one call.
+
+    The same files as the four commands write, with the same bytes; what is up to date is not done again, and a run that
+    was stopped continues. With --json every stage prints a line of its own.
+    """
+    prep, conditions, material = output / "prep.npz", output / "conditions", output / "material.npz"
+    arguments = {
+        "prep": [mesh, "-o", prep],
+        "conditions": [prep, "-o", conditions],
+        "distill": [conditions, "--prompt", prompt, "-o", material],
+        "bake": [prep, material, "-o", output / "asset"],
+    }
+    contexts = []
+    for stage in STAGES:  # all options are read before anything long begins
+        options = [word for name, text in further if name == stage for word in split(text)]
+        words = [*map(str, arguments[stage]), *options, *common.flags()]
+        contexts.append(import_module(f"dreammat_cli.{stage}").command.make_context(f"dreammat {stage}", words))
+    for number, context in enumerate(contexts, 1):
+        if not (common.quiet or common.as_json):
+            click.echo(f"[{number} of {len(STAGES)}] {STAGES[number - 1]}", err=True)
+        with context:
+            context.command.invoke(context)
+
+
+def split(text: str) -> list[str]:
+    """Options as a shell would split them. Raises: BadParameter where a quote is left open."""
+    try:
+        return shlex.split(text)
+    except ValueError as error:
+        raise click.BadParameter(f"{text!r}: {error}", param_hint="--with") from error
