@@ -4,13 +4,14 @@ The grammar is that of a buyer's list, not of English: a phrase is a run of word
 join them ("with", "covered in", "peeling off"); parts ("sole", "rim") and patterns ("stripes") say where a phrase lies. What
 no table knows, a dictionary may explain by colours; the rest is kept as unknown. """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.objects import OBJECTS
 from stages.prior.places import PARTS, SHAPES, SHOWS, Region
 from stages.prior.stuffs import BOARDS, COATINGS, GENERIC, KNOWN, PATTERNED, ROOFS
-from stages.prior.tokens import Join, Token, tokens_of
+from stages.prior.tokens import Join, Token, singulars, tokens_of
 
 FIRST = Join("")
 """Before what nothing stands."""
@@ -23,7 +24,8 @@ class Phrase:
     substance: a name of `KNOWN`. boards: sawn. colors: words that make up its colour, names of substances among them. finish:
     words. weather: of `WEATHER`, `FADED`, `WET`. unknown: words that no table knows. thing: of `OBJECTS`. animal: of `ANIMALS`.
     region: where it lies. where: the word that said so. placed: whether that word came last. shows: what is beneath, where
-    it is said. """
+    it is said. much: factor of the share that it covers; amount: the same of each word of weather. part: the name of a part
+    that no table knows. closed: whether what it is was said, "a statue of". within: the part that it lies on. """
 
     join: Join = FIRST
     substance: str = ""
@@ -39,16 +41,21 @@ class Phrase:
     where: str = ""
     placed: bool = False
     shows: "Phrase | None" = None
+    much: float = 1.0
+    amount: dict[str, float] = field(default_factory=dict)
+    part: str = ""
+    closed: bool = False
+    within: "Phrase | None" = None
 
     @property
     def says_what(self) -> bool:
-        """Whether it names a stuff or a colour."""
-        return bool(self.substance or self.colors or self.thing or self.animal or self.unknown)
+        """Whether it names a stuff or a colour; "dark" alone is none."""
+        return bool(self.substance or self.thing or self.animal or self.unknown or any(map(is_hue, self.colors)))
 
     @property
     def color_only(self) -> bool:
         """Whether all it says of the stuff is its colour."""
-        return bool(self.colors) and not (self.substance or self.thing or self.animal or self.unknown)
+        return any(map(is_hue, self.colors)) and not (self.substance or self.thing or self.animal or self.unknown)
 
     @property
     def coats(self) -> bool:
@@ -56,9 +63,14 @@ class Phrase:
         return bool(self.substance) and (_family(self.substance) == "paint" or self.substance in COATINGS)
 
     @property
+    def metal(self) -> bool:
+        """Whether its substance is one."""
+        return bool(self.substance) and _family(self.substance) == "metal"
+
+    @property
     def empty(self) -> bool:
         """Whether it says nothing at all."""
-        return not (self.says_what or self.region or self.finish or self.weather or self.size)
+        return not (self.says_what or self.region or self.finish or self.weather or self.size or self.colors)
 
     def of_kind(self, kind: str) -> list[str]:
         """The words of a kind of token."""
@@ -66,26 +78,51 @@ class Phrase:
         return kinds.get(kind, self.size)
 
 
+def is_hue(word: str) -> bool:
+    """Whether a word of colour is a colour of itself, not a change of one."""
+    return word in COLORS or word in KNOWN or word.startswith("#")
+
+
 def split(
-    prompt: str, explained: Mapping[str, Sequence[str]] | None = None, matters: Callable[[str], bool] = bool
+    prompt: str,
+    explained: Mapping[str, Sequence[str]] | None = None,
+    matters: Callable[[str], bool] = bool,
+    real: Container[str] = (),
 ) -> list[Phrase]:
     """The phrases of a prompt, in its order; at least one.
 
     Args:
-        explained: a dictionary, as `Vocabulary` has. matters: whether a word that no table knows may mean a material.
+        explained: a dictionary, as `Vocabulary` has. matters: whether a word that no table knows may mean a material. real:
+        words that are no slips of the pen.
     """
     phrases = [Phrase()]
-    tokens = [token for token in tokens_of(prompt, explained or {}) if token.kind != "unknown" or matters(token.text)]
+    much = 1.0
+    tokens = [
+        token if token.kind != "unknown" or matters(token.text) else token._replace(kind="name")
+        for token in tokens_of(prompt, explained or {}, real)
+    ]
     for number, token in enumerate(tokens):
         now, following = phrases[-1], tokens[number + 1] if number + 1 < len(tokens) else Token("end", "")
+        if token.kind == "degree":
+            much = token.value
+            continue
+        if _stands_for_itself(token, now, following) and len(phrases) == 1:
+            token = Token("thing", token.text)
+        if token.kind == "weather":
+            now.amount[token.text] = much
+        elif token.kind in ("substance", "postfix") and much != 1:
+            now.much = much
+        much = much if token.kind in ("join", "color", "finish") else 1.0
         join = _join_of(token, now, following)
         if join is None:
+            if token.text == "of":
+                now.closed = True
             if token.kind == "join" and token.value.kind == "peel" and "peeling" not in now.weather:
                 now.weather.append("peeling")
             if token.kind in ("join", "postfix", "comma", "half"):
                 continue
             if _begins(token, now):
-                now = Phrase(Join("with"))
+                now = Phrase(Join("paint" if token.text in PAINTED else "with"))
                 phrases.append(now)
             _take(now, token)
         elif now.empty:
@@ -116,6 +153,9 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
         return Join("half")
     if token.kind != "join":
         return None
+    if token.value.kind == "show" and following.kind in ("comma", "end") and now.says_what:
+        now.join = token.value  # "peeling paint, gray wood showing"
+        return None
     if token.value.kind in ("peel", "through") and following.kind in ("comma", "end", "join"):
         return None  # "blue paint peeling off, ..."
     if token.value.kind == "of":
@@ -129,10 +169,19 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
     return token.value  # type: ignore[no-any-return]
 
 
+PAINTED = ("painted", "lacquer", "enamel", "whitewash", "gilded")
+"""What is said of a stuff after its name: "iron painted black"."""
+
+
+def _stands_for_itself(token: Token, now: Phrase, following: Token) -> bool:
+    """Whether what may be a part is the thing itself: "a helmet in olive drab"."""
+    return token.kind == "part" and token.text in OBJECTS and not now.says_what and following.text not in (",", ":", "", "and")
+
+
 def _begins(token: Token, now: Phrase) -> bool:
     """Whether a token begins a phrase although no word joins it to the one before: "gold rim white porcelain"."""
     if token.kind == "substance":
-        return now.placed or bool(now.thing and now.substance)
+        return now.placed or bool(now.substance and (now.thing or (token.text in PAINTED and not now.coats)))
     return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS))
 
 
@@ -145,19 +194,30 @@ def _take(phrase: Phrase, token: Token) -> None:
         said = phrase.of_kind(kind)
         if text not in said:
             said.append(text)
+    elif kind == "part" and phrase.thing and phrase.join is FIRST:
+        return  # "a bicycle frame" is all frame
     elif kind in ("part", "shape") and (phrase.region is None or kind == "part"):
         phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
-    elif kind == "thing" and not phrase.thing:
-        phrase.thing = text
+    elif kind == "thing" and not phrase.closed:
+        phrase.thing = text  # the last of a run says what it is: "school bus"
+    elif kind == "name" and (phrase.substance or phrase.colors) and not phrase.region:
+        phrase.part = text
     elif kind == "animal":
         phrase.animal = text
     elif kind == "dyed" and phrase.substance:
         phrase.colors, phrase.substance = [*phrase.colors, phrase.substance], ""
 
 
+ROUGHENED = ("frosted", "matte")
+"""Words of finish that are part of a stuff's name."""
+
+
 def _name(phrase: Phrase, text: str) -> None:
     """A substance's name, which may stand after another: "oak planks", "stone bricks", "gold fabric", "pine wood"."""
     old = phrase.substance
+    first = text.split(" ")[0]
+    if " " in text and first in ROUGHENED and first not in phrase.finish:
+        phrase.finish.append(first)
     if text.endswith((" wall", " walls")) and phrase.region is None:
         phrase.region, phrase.where = PARTS["walls"], "walls"
     phrase.boards = phrase.boards or text in BOARDS
@@ -182,19 +242,40 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
     for number, phrase in enumerate(phrases):
         if phrase.where.endswith("roof"):
             phrase.substance = ROOFS.get(phrase.substance, phrase.substance)
-        if not phrase.says_what and phrase.where in OBJECTS and len(phrases) == 1:
-            phrases[number] = replace(phrase, thing=phrase.where, region=None, where="")  # "a tire"
+        thing = next((name for name in (phrase.where, *singulars(phrase.where)) if name in OBJECTS), "")
+        if not phrase.says_what and thing and len(phrases) == 1:
+            phrases[number] = replace(phrase, thing=thing, region=None, where="")  # "a tire"
     result: list[Phrase] = []
     for number, phrase in enumerate(phrases):
         before = result[-1] if result else None
         after = phrases[number + 1] if number + 1 < len(phrases) else None
-        if before and phrase.join.kind == "show":
+        if not before and phrase.where in ALONE and after and after.join.kind == "comma" and after.color_only:
+            phrase.region, phrase.where = None, ""  # "quartz countertop, white"
+        if phrase.substance in PAINTED and phrase.join.kind == "comma" and not phrase.region:
+            phrase.join = Join("paint")
+        if after and not before and after.join.kind == "comma" and not (phrase.says_what or phrase.region):
+            after.join = phrase.join  # "matte, dark red paint"
+            after.finish += phrase.finish
+            after.colors[:0] = phrase.colors
+            _add(after.weather, phrase.weather)
+        elif before and phrase.join.kind == "show":
             _show(result, phrase)
+        elif before and phrase.join.kind == "through" and phrase.says_what and not phrase.region:
+            result[-1] = _covering(before, phrase)
+        elif before and phrase.join.kind == "paint" and not (before.region or phrase.region) and before.says_what:
+            phrase.join, phrase.thing = before.join, phrase.thing or before.thing
+            _add(phrase.weather, before.weather)
+            if before.substance:
+                phrase.shows = Phrase(substance=before.substance, boards=before.boards, colors=before.colors)
+            result[-1] = phrase
+        elif before and phrase.substance in CLEAR and not (phrase.colors or phrase.region or before.region):
+            before.finish += phrase.finish or ["glossy"]
         elif before and not phrase.says_what and not phrase.region:  # "bronze, polished"
             whole = result[0] if before.region and phrase.join.kind == "comma" else before  # "a boot with a red sole, worn"
             if any(word in SHOWS for word in phrase.weather):
                 whole = next((p for p in result if p.coats), whole)  # "green paint over wood, peeling"
             whole.finish += phrase.finish
+            whole.colors += [word for word in phrase.colors if word in LEANINGS]
             _add(whole.weather, phrase.weather)
         elif before and _wears(before, phrase):
             if phrase.coats and not before.coats:  # "a white fence with flaking paint"
@@ -207,11 +288,40 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
         elif before and not phrase.says_what and not (phrase.weather or phrase.finish):
             _lend(before, phrase, after, result)
         else:
+            if before and _within(before, phrase):
+                phrase.within = before
             result.append(phrase)
     return _in_pairs(result)
 
 
-WEARS = {**dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained"}
+def _within(before: Phrase, phrase: Phrase) -> bool:
+    """Whether a phrase lies on the part of which the one before tells: "a bone handle wrapped in leather", "a red cap with
+    white dots"."""
+    nests = phrase.join.kind in ("cover", "partly", "spots", "inlay", "stripe", "check", "stud")
+    nests = nests and (phrase.region is None or phrase.where in SHAPES)
+    marks = phrase.join.kind == "with" and phrase.where in SHAPES
+    return before.where in PARTS and before.join.kind != "" and phrase.says_what and (nests or marks)
+
+
+def _covering(before: Phrase, phrase: Phrase) -> Phrase:
+    """The coat through which what was named first is seen: "steel visible under chipped paint"."""
+    phrase.join, phrase.thing, phrase.shows = before.join, phrase.thing or before.thing, before
+    if not any(word in SHOWS for word in phrase.weather):
+        phrase.weather.append("worn")
+    return phrase
+
+
+ALONE = ("countertop", "tabletop", "table top", "desktop", "shelf", "door", "window", "helmet", "hat", "cushion", "screen")
+"""Parts that are things of their own, too."""
+
+CLEAR = frozenset(["glaze", "varnish", "glazed", "clear coat", "clearcoat"])
+"""Coats that one sees through."""
+
+WEARS = {
+    **dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained",
+    **dict.fromkeys(("streaks", "drips", "water stains", "rain streaks", "water streaks", "water marks"), "streaky"),
+    **dict.fromkeys(("smudges", "smears"), "dirty"),
+}  # fmt: skip
 """Patterns that are wear where no stuff is named for them."""
 
 
@@ -237,11 +347,15 @@ def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     if phrase.region or phrase.thing or (after and after.region and after.join.kind == "and" and after.where not in PARTS):
         return False
     bare = before.thing and not (before.substance or before.colors or before.unknown)
-    unsaid = phrase.color_only and bool(before.substance) and not before.colors and not before.region
+    dull = bool(before.substance) and not before.metal
+    hue = phrase.color_only or (dull and phrase.substance in COLORS and not (phrase.colors or phrase.unknown or phrase.finish))
+    unsaid = hue and bool(before.substance or before.unknown) and not before.colors and not before.region
     return bool(bare and (phrase.says_what)) or unsaid
 
 
 def _describe(before: Phrase, phrase: Phrase) -> None:
+    if before.substance and phrase.substance in COLORS:
+        before.colors.append(phrase.substance)  # "candle wax, ivory"
     before.substance = before.substance or phrase.substance
     before.boards |= phrase.boards
     before.colors += phrase.colors

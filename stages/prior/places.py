@@ -22,7 +22,10 @@ def _table(*entries: tuple[str, Region]) -> dict[str, Region]:
 
 
 PARTS = _table(
-    ("body, bodies, walls, sides, main body, hull, bodywork, exterior, outside, background, ground, rest", Region("all", 1.0)),
+    ("body, bodies, walls, sides, main body, bodywork, exterior, outside, background, ground, rest, siding, cladding, casing, "
+     "housing, enclosure, chassis, outer shell, fuselage, main part, everything else, remainder", Region("all", 1.0)),
+    ("hull", Region("below", 0.6)), ("lower body", Region("below", 0.5)), ("upper body", Region("above", 0.5)),
+    ("label, sticker, decal, logo, emblem, badge", Region("front", 0.12)),
     ("base, bottom, underside, lower half, lower part, bottom half, lower, lower section", Region("below", 0.5)),
     ("sole, soles, outsole, tread, treads, rubber sole", Region("below", 0.08)),
     ("pedestal, plinth, stand, socle, foundation, foundations, hem, skirting", Region("below", 0.2)),
@@ -42,13 +45,14 @@ PARTS = _table(
     ("blade, blades, barrel of it", Region("above", 0.7)),
     ("handle, grip, hilt, haft, pommel, shaft, handles, handlebar, stock", Region("below", 0.3)),
     ("front, front side, fascia, door, front half, screen, windows, window, windshield, chest plate", Region("front", 0.3)),
-    ("beak, nose, snout, eyes, nozzle", Region("front", 0.1)),
+    ("beak, nose, snout, eyes, nozzle, toe, toes, toe cap, toe caps, toecap, toecaps", Region("front", 0.12)),
     ("back side, rear, reverse, back half, tail, backside", Region("back", 0.3)),
     ("left half, left side, left", Region("left", 0.5)), ("right half, right side, right", Region("right", 0.5)),
     ("belly, underbelly, bottom side", Region("down", 0.3)),
     ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "
      "edge trim, gilding, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
-     "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching",
+     "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching, laces, "
+     "shoelaces, scabbard, sheath, clasp, lettering, rivet heads",
      Region("edges", 0.1, 0.04, 0.1)),
     ("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams, crevice, "
      "carvings, engraved lines, creases, corners inside, cavities, pits", Region("crevices", 0.22, 0.08, 0.6)),
@@ -61,7 +65,8 @@ TABLE_PARTS = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat
 """Parts of furniture, which lie elsewhere than in other things."""
 
 SHAPES = _table(
-    ("stripes, stripe, striped, pinstripes, vertical stripes, diagonal stripes, racing stripes, racing stripe",
+    ("zigzag, zigzags, chevrons, stripes, stripe, striped, pinstripes, vertical stripes, diagonal stripes, "
+         "racing stripes, racing stripe",
      Region("stripes", 0.5, 0.14)),
     ("bands, band, hoops, rings, ring, straps, strap, belts, belt, banded, horizontal stripes, horizontal bands, banding, sash",
      Region("bands", 0.3, 0.22)),
@@ -69,12 +74,15 @@ SHAPES = _table(
      Region("spots", 0.3, 0.14)),
     ("studs, rivets, eyelets, grommets, sequins, screws, buttons, knobs, bolts, nails, studded, "
      "riveted", Region("spots", 0.06, 0.07)),
-    ("checks, checkered, chequered, checkerboard, squares, check, checked, check pattern, chessboard pattern",
+    ("chess board, chessboard, checkerboard pattern, checks, checkered, chequered, checkerboard, squares, check, checked, "
+         "check pattern, chessboard pattern",
      Region("checks", 0.5, 0.12)),
-    ("patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, mottled, splashes, splatters, splattered, "
+    ("water stains, patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, mottled, splashes, "
+         "splatters, splattered, "
      "spattered, splashed, patched, blotchy, smudges, smears, puddles, flames, graffiti, spills",
      Region("patches", 0.35, 0.16, 0.7)),
-    ("streaks, drips, runs, streaked, drippings, dripping", Region("streaks", 0.2, 0.12, 0.8)),
+    ("rain streaks, water streaks, water marks, streaks, drips, runs, streaked, drippings, dripping",
+     Region("streaks", 0.2, 0.12, 0.8)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
     ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks, lines, kintsugi, "
      "lightning", Region("veins", 0.06, 0.22)),
@@ -153,6 +161,7 @@ WEATHER = _weather(
     ("patinated, oxidised, oxidized", Weather("verdigris", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.85)),
     ("worn, battered, battle-worn, distressed, used, well-worn, worn-out", Weather("", Region("edges", 0.1, 0.06, 1.0), -1e-4)),
     ("chipped, peeling, flaking, flaky, flaked, peeled", Weather("", Region("chips", 0.2, 0.08, 0.9), -2e-4)),
+    ("cracked, crazed, fissured, fractured, cracking", Weather("grime", Region("veins", 0.04, 0.2, 0.3), -2e-4, 0.85)),
     ("scratched, scuffed, scraped", Weather("", Region("scratches", 0.05, 0.1, 0.9), -5e-5)),
     ("mossy, overgrown", Weather("moss", Region("crevices", 0.42, 0.18, 1.0), 3e-3)),
     ("bloody, bloodstained, blood-stained", Weather("blood", Region("patches", 0.25, 0.18, 0.9))),
@@ -161,6 +170,12 @@ WEATHER = _weather(
     ("snowy", Weather("snow", Region("up", 0.42, 0.12, 0.4), 8e-3)),
 )
 """Words of wear and weather, from below: what lies lowest first."""
+
+CORRODES = {
+    **dict.fromkeys(("copper", "brass", "bronze"), "verdigris"), **dict.fromkeys(("iron", "steel"), "rust"),
+    **dict.fromkeys(("silver", "gold", "aluminium", "chrome", "lead", "titanium", "foil"), "tarnish"),
+}  # fmt: skip
+"""The last word of a metal's look → what air makes of it."""
 
 SHOWS = frozenset(word for word, weather in WEATHER.items() if not weather.stuff)
 """Those that let show what is beneath."""
@@ -174,6 +189,15 @@ FADED = {"weathered": 0.85, "aged": 0.9, "old": 0.95, "faded": 0.7, "bleached": 
 WET = {"wet": 0.35, "damp": 0.6, "oily": 0.45, "slimy": 0.35}
 """Words of wetness: factor of the roughness."""
 
+DETAILS = Region("edges", 0.1, 0.04, 0.1)
+"""Where a part lies that no table knows."""
+
+SHELLED = frozenset(["ladybird", "ladybug"])
+"""Animals of `ANIMALS` that have no fur."""
+
+PRINTED = frozenset(["camouflage", "camo"])
+"""Those that are printed on cloth."""
+
 COVERED = Region("patches", 0.75, 0.3, 0.6)
 PARTLY = Region("patches", 0.35, 0.2, 0.7)
 FADE = Region("fade", 0.5, 0.6)
@@ -186,7 +210,7 @@ JOINED = {
     "streak": SHAPES["streaks"], "vein": SHAPES["veins"], "cap": Region("up", 0.4, 0.12, 0.4), "rim": PARTS["rim"],
     "tip": PARTS["tip"], "sole": PARTS["sole"], "handle": PARTS["handle"], "line": PARTS["lining"], "stud": SHAPES["studs"],
     "all": Region("all", 1.0), "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5),
-    "bottom": PARTS["base"], "legs": PARTS["legs"],
+    "bottom": PARTS["base"], "legs": PARTS["legs"], "seat": PARTS["seat"], "paint": Region("all", 1.0),
 }  # fmt: skip
 """Where a phrase lies that only its joining word tells."""
 

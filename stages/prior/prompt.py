@@ -19,9 +19,11 @@ from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
-from stages.prior.phrases import Join, Phrase, split
+from stages.prior.phrases import Join, Phrase, is_hue, split
 from stages.prior.places import (
     ANIMALS,
+    CORRODES,
+    DETAILS,
     FADE,
     FADED,
     GATHERS,
@@ -31,6 +33,9 @@ from stages.prior.places import (
     PARTS,
     PEELED,
     PEELS,
+    PRINTED,
+    SHAPES,
+    SHELLED,
     TABLE_PARTS,
     TABLES,
     WEATHER,
@@ -81,23 +86,32 @@ class Reading:
     def recipe(self, prompt: str, seed: int) -> Recipe:
         """See `read_prompt`."""
         rest, said = measured(prompt)
-        phrases = split(rest, self._prior.vocabulary.explained, self._means_material)
+        phrases = self._phrases(rest)
         self._metres = self._metres or said or _usual_size(phrases)
         base, over = _ordered(phrases)
-        layers = self._base_layers(base)
+        layers = self._base_layers(base, {phrase.region for phrase in over})
         coat = layers.pop(0).coat
         for phrase in over:
-            layers += self._over(phrase, coat)
+            layers += self._over(phrase, coat, base)
         return Recipe(coat, tuple(_once(layers)), seed)
 
-    def _base_layers(self, base: Phrase) -> list[Layer]:
-        """The base's coat, as a layer, and what lies on it of itself: its weather, an animal's marks, a thing's own parts."""
+    def _phrases(self, prompt: str) -> list[Phrase]:
+        """The phrases of a prompt: of the words that tables know, or where there are none, of all that may mean a material."""
+        vocabulary = self._prior.vocabulary
+        phrases = split(prompt, vocabulary.explained, self._speaks, vocabulary.index)
+        if any(phrase.says_what or phrase.weather for phrase in phrases):
+            return phrases
+        return split(prompt, vocabulary.explained, self._means_material, vocabulary.index)
+
+    def _base_layers(self, base: Phrase, said: Collection[Region | None] = ()) -> list[Layer]:
+        """The base's coat, as a layer, and what lies on it of itself: its weather, an animal's marks, a thing's own parts but
+        for those of which words say what they are. Args: said: regions of which words speak."""
         made = split(OBJECTS[base.thing].made) if base.thing and not (base.substance or base.unknown or base.animal) else []
         if len(made) > 1 and not base.colors:
             inner, over = _ordered(made)
             inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
             coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
-            parts = [layer for phrase in over for layer in self._over(phrase, coat)]
+            parts = [layer for part in over if part.region not in said for layer in self._over(part, coat, inner)]
             return [Layer(coat), *parts, *self._weather(inner)]
         coat = self._coat(base)
         layers = [Layer(coat)]
@@ -109,10 +123,10 @@ class Reading:
             layers.append(Layer(marked, (region.mask(base.animal),)))
         return [*layers, *self._weather(base)]
 
-    def _over(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
+    def _over(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
         """What a phrase lays over the base."""
         if not phrase.says_what:
-            return self._more(phrase, beneath)
+            return self._more(phrase, beneath, base)
         coat = self._coat(phrase, beneath)
         peels = [word for word in phrase.weather if word in PEELS]
         if phrase.region is None and (phrase.join.kind == "peel" or (peels and phrase.join.kind in BESIDE)):
@@ -125,12 +139,17 @@ class Reading:
             marked = replace(beneath, color=_color(phrase) if phrase.colors else _triple(rgb(marks)), said=_said(phrase))
             return [Layer(marked, (region.mask(phrase.animal),))]
         mask = self._region(phrase).mask(phrase.where)
+        if phrase.within and phrase.within.region:
+            part = phrase.within.region.mask(phrase.within.where)
+            whole = phrase.join.kind == "cover" and phrase.substance not in GATHERS
+            masks = (part,) if whole else (part, mask)
+            return [Layer(coat, masks, LAYERED.get(coat.look, 0.0)), *self._weather(phrase, masks, beneath)]
         if phrase.join.kind == "fade":
             downwards = bool(phrase.region) and mask.kind == "below"
             mask = replace(FADE.mask(phrase.where), invert=downwards)
         return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,), beneath)]
 
-    def _more(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
+    def _more(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
         """A part of which only finish or wear is said: "polished edges", "dirty cracks"."""
         where = (phrase.region or JOINED["with"]).mask(phrase.where)
         layers = []
@@ -140,12 +159,15 @@ class Reading:
             layers = [Layer(replace(beneath, roughness=rough, said=_said(phrase)), (where,))]
         for word in _weathers(phrase):
             weather = WEATHER[word]
-            coat = self._named(weather.stuff) if weather.stuff else _worn(beneath)
+            coat = self._named(weather.stuff) if weather.stuff else self._beneath(base, None)
             layers.append(Layer(coat, (replace(where, wear=1.0),), weather.thickness, weather.strength))
         return layers
 
     def _region(self, phrase: Phrase) -> Region:
         """Where a phrase lies."""
+        return _scaled(self._whole_region(phrase), phrase.much)
+
+    def _whole_region(self, phrase: Phrase) -> Region:
         gathers = GATHERS.get(ONCE.get(phrase.substance, phrase.substance))
         if gathers and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", 0.45, gathers.size, gathers.wear)
@@ -154,23 +176,33 @@ class Reading:
         if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):
             covers = phrase.join.kind in ("cover", "over")
             return gathers._replace(share=max(gathers.share, 0.65)) if covers and gathers.kind != "up" else gathers
+        if phrase.substance and _family(phrase) == "gem" and phrase.join.kind in BESIDE and not phrase.part:
+            return SHAPES["studs"]
+        if phrase.substance in ROOFING and phrase.join.kind in ("", *BESIDE):
+            return PARTS["roof"]
+        if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
+            return DETAILS
         return JOINED.get(phrase.join.kind, JOINED["with"])
 
     def _coat(self, phrase: Phrase, beneath: Coat | None = None) -> Coat:
         """The substance of a phrase, with the colour and finish that it asks for."""
+        made = OBJECTS[phrase.thing].made if phrase.thing else ""
+        if made and not any(map(self._speaks, phrase.unknown)):
+            phrase = replace(phrase, unknown=[])  # "a deere tractor"
         if phrase.unknown and (not phrase.substance or phrase.substance in GENERIC):
             return self._unknown(phrase)
-        made = OBJECTS[phrase.thing].made if phrase.thing else ""
         if phrase.substance:
             usual = split(made)[0] if made else Phrase()
             kin = phrase.substance in GENERIC and bool(usual.substance) and _family(usual) == _family(phrase)
             if not phrase.colors and (kin or usual.substance == phrase.substance):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
-            return self._of(stuff(phrase.substance, bool(phrase.colors)), phrase)
+            named = "painted wood" if phrase.substance in WOODEN and _gaudy(phrase) else phrase.substance
+            return self._of(stuff(named, bool(phrase.colors)), phrase)
         if made:
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
             inner.weather, inner.region, inner.where = phrase.weather, None, ""
+            inner.substance = _painted(inner) if phrase.colors else inner.substance
             if inner.substance == "painted metal" and any(word in FINISHES_METAL for word in inner.finish):
                 inner.substance = "paint"
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
@@ -183,7 +215,8 @@ class Reading:
             look = look_of(stuff("paint", True), available=self._looks) if look == "paint" else look
             return replace(beneath, color=_color(phrase), look=look, metallic=metallic, roughness=rough, said=_said(phrase))
         if phrase.animal:
-            return self._of(stuff("fur", False), phrase)
+            name = "glossy plastic" if phrase.animal in SHELLED else "cotton" if phrase.animal in PRINTED else "fur"
+            return self._of(stuff(name, False), phrase)
         weathers = [WEATHER[word].stuff for word in _weathers(phrase) if WEATHER[word].stuff]
         name = "paint" if phrase.colors else weathers[0] if weathers else UNSAID
         if weathers and not phrase.colors:
@@ -199,7 +232,8 @@ class Reading:
         color = _faded(np.array(_described(wanted, _color(phrase, wanted.color))), phrase)
         look = look_of(wanted, phrase.finish, self._looks)
         metallic = wanted.metallic
-        if metallic and phrase.colors and any(word in COLORS for word in phrase.colors) and wanted.look != "brushed aluminium":
+        hue = any(word in COLORS or word.startswith("#") for word in phrase.colors)
+        if metallic and hue and wanted.look != "brushed aluminium":
             color = _triple(0.6 * np.array(_color(phrase)) + 0.4 * np.array(_color(phrase)) * np.array(wanted.color))
         return self._sized(Coat(look, color, float(roughness), metallic, said=f"{name} {_said(phrase)}".strip()))
 
@@ -223,11 +257,18 @@ class Reading:
         plain = all(w in KNOWN and w not in COLORS for w in told)
         return told[-1] if plain and len(families) == 1 and families != {"metal"} else ""
 
+    def _speaks(self, word: str) -> bool:
+        """Whether a table or a dictionary knows a word for that of a material."""
+        if word.endswith("ed") and word not in LOOK_OF:
+            return False  # what was done to a thing, not what it is made of
+        return word in LOOK_OF or any(w in KNOWN for w in self._prior.vocabulary.explained.get(word, ()))
+
     def _means_material(self, word: str) -> bool:
         """Whether a word that no table knows says anything of a material."""
-        told = self._prior.vocabulary.explained.get(word, ())
-        if word in LOOK_OF or any(w in KNOWN for w in told):
+        if self._speaks(word):
             return True
+        if not self._prior.vocabulary.knows(word):
+            return False
         meaning = self._meaning(word)
         return max(float(self._meaning(name) @ meaning) for name in KNOWN) > ALIKE
 
@@ -253,8 +294,8 @@ class Reading:
         layers = []
         for word in _weathers(phrase):
             weather = WEATHER[word]
-            coat = self._named(weather.stuff) if weather.stuff else self._beneath(phrase, under)
-            mask = weather.region.mask(word)
+            coat = self._named(_corroded(weather.stuff, phrase)) if weather.stuff else self._beneath(phrase, under)
+            mask = _scaled(weather.region, phrase.amount.get(word, 1.0)).mask(word)
             if not weather.stuff and phrase.shows and phrase.shows.region:
                 mask = phrase.shows.region.mask(phrase.shows.where)
             layers.append(Layer(coat, (*where, mask), weather.thickness, weather.strength))
@@ -273,11 +314,18 @@ class Reading:
         own = self._coat(phrase)
         family = KNOWN[phrase.substance][0].family if phrase.substance else ""
         if family == "paint" or own.look in ("paint", "car paint", "painted wood"):
-            return self._named("pine" if "wood" in phrase.substance else "steel")
+            made = split(OBJECTS[phrase.thing].made)[0] if phrase.thing else Phrase()
+            if made.substance and not made.coats:
+                return self._coat(made)
+            return self._named("pine" if "wood" in phrase.substance + made.substance or own.look == "painted wood" else "steel")
         return _worn(own)
 
     def _sized(self, coat: Coat) -> Coat:
         return replace(coat, metres=self._metres or METRES.get(coat.look, 1.0))
+
+
+LARGE = 0.5
+"""Share of a part that may be the base of what else is named."""
 
 
 def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
@@ -300,11 +348,19 @@ def _stands(first: Phrase, second: Phrase) -> bool:
 
 
 def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
-    """The base among phrases: that of the body, where one says so; a covering is the base of what has no stuff of its own."""
+    """The base among phrases: that of the body, where one says so, or of the largest part, where each is one; a covering is
+    the base of what has no stuff of its own."""
+    if first.where in PARTS and over and all(p.where in PARTS and p.says_what for p in over):
+        parts = [first, *over]
+        largest = max(parts, key=lambda p: p.region.share if p.region else 0.0)
+        if largest is not first and first.region and first.region.share < LARGE:
+            first, over = largest, [p for p in parts if p is not largest]
     body = next((k for k, p in enumerate(over) if p.region and p.region.kind == "all" and p.says_what), None)
     if body is not None:
         thing = first.thing
         alone = bool(thing) and not (first.substance or first.colors or first.unknown)
+        if not (alone or first.region or first.substance in (*GATHERS, *ROOFING)):
+            first = replace(first, region=Region("above", 0.4))
         first, over = over[body], [*([] if alone else [first]), *over[:body], *over[body + 1 :]]
         first = replace(first, thing=first.thing or (thing if alone else ""))
     told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
@@ -319,6 +375,47 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
     if first.thing in TABLES:
         over = [replace(p, region=TABLE_PARTS.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
     return first, over
+
+
+def _scaled(region: Region, much: float) -> Region:
+    """A region that covers less or more than usual."""
+    return region if much == 1 else region._replace(share=min(0.9, region.share * much))
+
+
+def _painted(made: Phrase) -> str:
+    """What a thing is made of where words name its colour: wood and iron are painted, but for those of their own colour."""
+    own = KNOWN[made.substance][0] if made.substance else None
+    if not own or own.paintable or own.family not in ("wood", "metal"):
+        return made.substance
+    hues = [word for word in made.colors if word in COLORS or word.startswith("#")]
+    if not hues or made.substance in DYED_METALS:
+        return made.substance
+    named, usual = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (_color(made), own.color))
+    grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH)
+    same = own.family == "wood" and float(np.linalg.norm(named - usual)) < SIMILAR
+    return made.substance if grey or same else "painted wood" if own.family == "wood" else "painted metal"
+
+
+WOODEN = ("wood", "wooden", "timber")
+"""Wood of any kind, which is painted where words give it a colour that no wood has."""
+
+
+def _gaudy(phrase: Phrase) -> bool:
+    """Whether a phrase's colour is one that no wood has of itself: green, blue, red."""
+    if not any(word in COLORS or word.startswith("#") for word in phrase.colors):
+        return False
+    _, *chroma = to_oklab(srgb_decode(np.array(_color(phrase)))[:, None])[:, 0]
+    return bool(np.hypot(*chroma) > GREYISH and (chroma[1] < 0.6 * np.hypot(*chroma)))
+
+
+DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "silver", "brass", "bronze", "copper", "chrome"])
+"""Metals that take colour as metals, or have their own."""
+
+GREYISH = 0.04
+"""Chroma in OKLab of a colour that a bare metal may have."""
+
+ROOFING = frozenset(["thatch", "thatched", "roof tiles", "shingles", "slate tiles", "roof slates"])
+"""What lies on roofs when nobody says where."""
 
 
 def _covers(phrase: Phrase) -> bool:
@@ -341,6 +438,13 @@ def _once(layers: list[Layer]) -> list[Layer]:
     return list({(layer.coat.look, layer.coat.color, layer.masks): layer for layer in reversed(layers)}.values())[::-1]
 
 
+def _corroded(name: str, phrase: Phrase) -> str:
+    """What weather leaves on a phrase's stuff: rust on iron, verdigris on copper."""
+    if name not in ("rust", "verdigris") or not phrase.substance or not KNOWN[phrase.substance][0].metallic:
+        return name
+    return CORRODES.get(KNOWN[phrase.substance][0].look.split(" ")[-1], name)
+
+
 def _weathers(phrase: Phrase) -> list[str]:
     """The words of weather of a phrase from below, one for each thing that weather does."""
     told: dict[tuple[str, str], str] = {}
@@ -354,7 +458,10 @@ def _weathers(phrase: Phrase) -> list[str]:
 
 def _color(phrase: Phrase, own: RGB | None = None) -> RGB:
     """sRGB of a phrase's colour words: those that name colours mixed, or the stuff's own, changed by those that change one."""
-    base = [rgb(COLORS[w]) if w in COLORS else np.array(KNOWN[w][0].color) for w in phrase.colors if w in COLORS or w in KNOWN]
+    base = [
+        rgb(COLORS.get(w, w)) if w in COLORS or w.startswith("#") else np.array(KNOWN[w][0].color)
+        for w in phrase.colors if is_hue(w)
+    ]  # fmt: skip
     color = np.mean(base, 0) if base else np.array((0.5, 0.5, 0.5) if own is None else own)
     for word in (*LEANINGS, *CHANGES):
         if word in phrase.colors:
@@ -413,4 +520,5 @@ def _said(phrase: Phrase) -> str:
     """A phrase in few words."""
     boards = ["boards"] if phrase.boards and phrase.substance not in BOARDS else []
     name = phrase.substance or phrase.animal or phrase.thing
-    return " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, name, *boards]).strip()
+    finish = [word for word in phrase.finish if word not in name.split(" ")]
+    return " ".join([*finish, *phrase.colors, *phrase.unknown, name, *boards]).strip()

@@ -76,6 +76,10 @@ class Vocabulary:
             self._known[word] = self._look_up(word)
         return self._known[word]
 
+    def knows(self, word: str) -> bool:
+        """Whether the table has it, its stem or its halves: whether its vector is more than a guess by its letters."""
+        return bool(self._exact(word) or self._stem(word) or self._compound(word))
+
     def _look_up(self, word: str) -> NDArray[np.float32]:
         parts = self._exact(word) or self._stem(word) or self._compound(word)
         if parts:

@@ -2,32 +2,71 @@
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import takewhile
+from string import ascii_lowercase
 from typing import Any, NamedTuple
 
 from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS
 from stages.prior.names import FINISHES, FINISHES_METAL
-from stages.prior.objects import OBJECTS, words
+from stages.prior.objects import OBJECTS, rows, words
 from stages.prior.places import ANIMALS, FADED, PARTS, SHAPES, WEATHER, WET
 from stages.prior.sizes import TIMES
-from stages.prior.stuffs import FINISH_LOOKS, KNOWN, LOOK_OF
+from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF
 
 FILLER = words(
-    "a photo of, a photograph of, a d render of, d render of, render of, a rendering of, a picture of, an image of, "
-    "a model of, highly detailed, detailed texture, detailed, realistic, photorealistic, studio lighting, "
-    "physically based, pbr, k, texture, material, "
+    "a photo of, a photograph of, a render of, a rendering of, a picture of, an image of, a model of, highly detailed, "
+    "photo of, render of, rendering of, picture of, image of, model of, photo, render, "
+    "detailed texture, detailed, realistic, photorealistic, studio lighting, physically based, pbr, k, texture, material, "
     "surface, front view, side view, back view, top view, overhead view, high quality, masterpiece, beautiful, made of, "
     "made from, made out of, made in, carved from, carved out of, cut from, built of, built from, a, an, the, is, are, at, "
-    "its, some, very, all, from, entirely, completely, slightly, heavily, partly, partially, fully, looks like, made, of it, "
-    "texturing, finish, finished, print, pattern, patterned, style, both, each, that, which, it, lots of, bits of, pieces of, "
-    "layer of, a bit of, a few, many, thick, thin, small amounts of, around, along, growing, underneath, on it, all over, "
+    "its, some, all, from, entirely, looks like, made, of it, "
+    "texturing, finish, finished, print, pattern, patterned, style, both, each, that, which, it, bits of, pieces of, "
+    "layer of, many, thick, thin, around, along, growing, on it, all over, lies, lie, made up of, made entirely of, "
     "everywhere, s, this, their, other, one, simple, nice, piece of, block of, part, piece, parts, half-timbered, out, "
-    "coat of, coats of, coating of, splash of, touch of, set of, pair of, sheet of, slab of, lump of, was, were, be, for, as, "
-    "tint, hue, tone, sheen, shine, glow, glowing, like"
+    "coat of, coats of, coating of, splash of, set of, pair of, sheet of, slab of, lump of, was, were, be, for, as, "
+    "tint, hue, tone, sheen, shine, glow, glowing, like, more, ware, grain, look, looking, effect, imitation, tones, shade of, "
+    "shades of, unpainted, untreated, unvarnished, uncoated, bare, raw, plain, solid, pure, real, genuine, only, just, "
+    "hand-painted, handmade, hand-made, handcrafted, hand-carved, carved, stylized, stylised, low poly, lowpoly, high poly, "
+    "cartoon, game asset, game ready, game-ready, game engine, unreal engine, unity, octane render, octane, blender, "
+    "cycles render, vray, substance painter, substance, trending on artstation, artstation, best quality, ultra detailed, "
+    "hyper detailed, hyperrealistic, ultra realistic, intricate details, intricate, ornate, cinematic lighting, "
+    "soft lighting, natural lighting, ambient light, concept art, sci-fi, cyberpunk, steampunk, post-apocalyptic, fantasy, "
+    "medieval, victorian, art deco, art nouveau, mid-century, mid century, modern, industrial, rustic, shabby chic, gothic, "
+    "baroque, tileable, seamless, tiling, texture variation, roughness variation, color variation, variation, award winning, "
+    "professional, elegant, close up, close-up, macro, hd, uhd, dslr, raw photo, hdr, upright, woven, stitched, crushed, "
+    "crumpled, dented in, ripped, torn, frayed, "
+    "wrinkled, down the sides, down the side, down the walls, down its sides, down, slats, slat"
 )
 """Words that say nothing of a material."""
+
+ENDINGS = ("ware", "work", "works", "like", "grain", "toned", "look", "ette")
+"""What may be grown to the end of a stuff's name: "brassware"."""
+
+DEGREES = {
+    **dict.fromkeys(words(
+        "slightly, lightly, a bit, a little bit, a touch, somewhat, mildly, subtly, faintly, barely, gently, "
+        "a light dusting of, light dusting of, a dusting of, dusting of, a hint of, hint of, hints of, a touch of, touch of, "
+        "touches of, traces of, a trace of, a thin layer of, thin layer of, a thin coat of, thin coat of, "
+        "a light coat of, a thin coating of, "
+        "sprinkling of, a sprinkling of, small amounts of, a few, a bit of, a little bit of, partly, partially"), 0.55),
+    **dict.fromkeys(words(
+        "heavily, extremely, badly, severely, thickly, totally, utterly, deeply, fully, completely, thoroughly, "
+        "a thick layer of, "
+        "thick layer of, a heavy layer of, a thick coat of, thick coat of, lots of, plenty of, a lot of, very"), 1.6),
+}  # fmt: skip
+"""How much of what follows: factor of the share that it covers."""
+
+DENIALS = words(
+    "without, without any, no, not, never, free of, minus, excluding, instead of, rather than, lacking, devoid of, non, "
+    "neither, "
+    "other than, than, no longer"
+)
+"""Words that say that what follows is not there."""
+
+SPARED = words("or, nor")
+"""Words that go on with what is denied."""
 
 
 class Join(NamedTuple):
@@ -42,8 +81,14 @@ def _joins(kind: str, text: str, beneath: bool = False) -> dict[str, Join]:
 
 
 JOINS = {
-    **_joins("with", "with, plus, has, have, having, featuring, including, but with, but, complete with"),
+    **_joins("with", "with, plus, has, have, having, featuring, including, but with, but, complete with, whose, where, while, "
+             "and whose, adorned with, decorated with, embellished with, fitted with, equipped with, accented with, "
+             "accented by, with accents of"),
     **_joins("and", "and"),
+    **_joins("paint", "painted in, painted with, lacquered in, lacquered with, enamelled in, enameled in, finished in, "
+             "finished with, sprayed in, sprayed with, powder-coated in, powder coated in, rendered in, glazed in, "
+             "glazed with, clothed in"),
+    **_joins("seat", "upholstered in, upholstered with, padded with, cushioned with"),
     **_joins("cover", "covered in, covered with, covered by, coated in, coated with, overgrown with, overgrown by, "
              "smothered in, "
              "caked in, caked with, under a layer of, dusted with, dusted in, encrusted with, topped by a layer of, clad in, "
@@ -64,18 +109,22 @@ JOINS = {
     **_joins("peel", "peeling off, peeling from, peeling away from, flaking off, flaking from, chipping off, chipped off, "
              "wearing off, "
              "coming off, chipping away from, peeling over, flaking over, worn off", beneath=True),
-    **_joins("show", "showing, revealing, exposing, worn down to, worn away to, chipped down to, chipped to, rubbed down to, "
+    **_joins("show", "showing, showing through to, revealing, exposing, worn down to, worn away to, chipped down to, "
+        "chipped to, rubbed down to, "
              "worn through to, that shows, that reveals, worn to reveal, chipped away to reveal, scraped down to, "
+             "worn to, sanded to, rubbed to, stripped to, scraped to, peeling to reveal, flaking to reveal, to reveal, "
+             "to expose, "
              "peeled back to"),
     **_joins("through", "showing through, shining through, visible through, peeking through, visible under, "
-             "visible beneath", True),
+             "visible beneath, shows through, peeks through, shines through, exposed under, "
+             "showing under, showing beneath", True),
     **_joins("fade", "fading into, fading to, fades into, fades to, blending into, blending to, turning into, turning to, "
              "turns into, turns to, becoming, becomes, "
              "transitioning to, transitioning into, gradient to, merging into, melting into, dissolving into, changing into"),
     **_joins("on", "on, onto, atop, upon, across, out of, growing on, growing out of, growing from, emerging from, mounted on, "
              "standing on, sitting on, resting on, lying on, painted on, painted onto, printed on, splashed on", True),
              **_joins("over", "over, on top of, applied to, laid over", True),
-    **_joins("above", "above, over top", True), **_joins("below", "below, under, beneath", True),
+    **_joins("above", "above, over top", True), **_joins("below", "below, under, beneath, underneath", True),
     **_joins("of", "of"), **_joins("to", "to"), **_joins("in", "in, into, set in, set into, embedded in"),
 }  # fmt: skip
 """Words between two phrases, and how these lie."""
@@ -107,20 +156,27 @@ class Token(NamedTuple):
     article: bool = False
 
 
-def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]]) -> list[Token]:
-    """Each known phrase, the longest first, and each word that none knows."""
+def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Container[str] = ()) -> list[Token]:
+    """Each known phrase, the longest first, and each word that none knows. Args: real: words that are no slips of the pen."""
     plain = unicodedata.normalize("NFKD", prompt.lower()).encode("ascii", "ignore").decode()
-    heard = re.findall(r"[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
+    plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
+    heard = re.findall(r"#[0-9a-f]{6}\b|[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
     found: list[Token] = []
     at, article = 0, False
     while at < len(heard):
+        if heard[at][0] == "#":
+            found.append(Token("color", heard[at]))
+            at += 1
+            continue
         if not heard[at][0].isalpha():
             found.append(Token("join", heard[at], Join("and")) if heard[at] in "&+/" else Token("comma", heard[at]))
             at += 1
             continue
-        token, length = _longest(heard, at)
-        if token is None and "-" in heard[at]:
-            heard[at : at + 1] = heard[at].split("-")
+        degree = bool(found) and found[-1].kind == "degree"
+        alone = _alone(heard[at]) if degree else None  # "slightly rusty | steel"
+        token, length = (alone, 1) if alone else _longest(heard, at)
+        if token is None and (again := _respelt(heard[at], explained, real)):
+            heard[at : at + 1] = again
             continue
         if token is None:
             found += [part._replace(article=article) for part in _explained(heard[at], explained)]
@@ -128,7 +184,34 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]]) -> list[Token
             found.append(token._replace(article=article))
         article = heard[at] in ("a", "an")
         at += length
-    return _resolved(found)
+    return _resolved(_denied(found))
+
+
+def _alone(word: str) -> Token | None:
+    """A single word of wear or finish, if it is one."""
+    token = _table()[0].get(word)
+    return token if token and token.kind in ("weather", "finish") else None
+
+
+def _denied(found: list[Token]) -> list[Token]:
+    """What is left without that which words say is not there: "iron, no rust"; "silver, not gold"."""
+    kept: list[Token] = []
+    denying = fresh = spare = False
+    for token in found:
+        if token.kind == "denial":
+            denying = fresh = True
+            spare = token.text == "than"
+        elif token.kind in ("join", "comma", "half") and token.text != "of":
+            if denying and not fresh and token.kind == "join" and token.text in SPARED:
+                continue
+            denying = False
+            kept.append(token)
+        elif not denying:
+            kept.append(token)
+        elif spare:
+            denying = False  # "darker than charcoal | rubber"
+        fresh = False if token.kind != "denial" else fresh
+    return kept
 
 
 def _longest(heard: list[str], at: int) -> tuple[Token | None, int]:
@@ -136,13 +219,59 @@ def _longest(heard: list[str], at: int) -> tuple[Token | None, int]:
     table, longest = _table()
     for length in range(min(longest, len(heard) - at), 0, -1):
         *before, last = heard[at : at + length]
-        for spelling in (last, last.replace("-", " "), *singulars(last)):
+        for spelling in (last, last.replace("-", " "), *singulars(last), f"{last}s", *plain_forms(last)):
             text = " ".join([*before, spelling])
-            if text in table:
-                return table[text], length
-            if text.replace("-", " ") in table:
-                return table[text.replace("-", " ")], length
+            for known in (text, text.replace("-", " "), text.replace("-", "")):
+                if known in table:
+                    return table[known], length
     return None, 1
+
+
+def plain_forms(word: str) -> list[str]:
+    """What a word may be the comparative or superlative of."""
+    stems = [word.removesuffix(end) for end in ("er", "est") if word.endswith(end) and len(word) > len(end) + 3]
+    return [plain for stem in stems for plain in (stem, f"{stem}e", f"{stem.removesuffix('i')}y")]
+
+
+def _respelt(word: str, explained: Container[str], real: Container[str]) -> list[str]:
+    """A word that no table knows as words that one does: its parts, or what it is a slip of the pen for; or nothing."""
+    if "-" in word:
+        *before, last = word.split("-")
+        return ["than", before[-1]] if last == "free" else [*before, last]
+    table = _table()[0]
+    if word in explained or len(word) < LEAST_LETTERS:
+        return []
+    halves = ((word[:cut], word[cut:]) for cut in range(len(word) - 3, 2, -1))
+    for first, second in halves:
+        whole = second in ENDINGS or any(one in table for one in (second, *singulars(second)))
+        if whole and second != "red" and _names_stuff(first):
+            return [first, *([] if second in ENDINGS else [second])]
+    if any(one in real for one in (word, *singulars(word))):
+        return []
+    return next(([slip] for slip in _slips(word) if _worth(slip)), [])
+
+
+LEAST_LETTERS = 5
+"""Letters of the shortest word that is taken for a slip of the pen."""
+
+
+def _names_stuff(text: str) -> bool:
+    token = _table()[0].get(text)
+    return token is not None and token.kind in ("substance", "color")
+
+
+def _worth(text: str) -> bool:
+    token = _table()[0].get(text)
+    return token is not None and token.kind not in ("filler", "join", "size", "half")
+
+
+def _slips(word: str) -> Iterator[str]:
+    """Words that become this one by a letter left out, put in, exchanged with its neighbour or another. Source: Norvig 2007."""
+    cuts = [(word[:k], word[k:]) for k in range(len(word) + 1)]
+    yield from (a + b[1] + b[0] + b[2:] for a, b in cuts if len(b) > 1)
+    yield from (a + b[1:] for a, b in cuts if b)
+    yield from (a + letter + b for a, b in cuts for letter in ascii_lowercase)
+    yield from (a + letter + b[1:] for a, b in cuts[1:] if b for letter in ascii_lowercase)
 
 
 def _explained(word: str, explained: Mapping[str, Sequence[str]]) -> list[Token]:
@@ -171,6 +300,10 @@ def _resolved(found: list[Token]) -> list[Token]:
         ahead = _run(found[number + 1 :])
         behind = _run(reversed(result))
         names = {t.kind for t in ahead} & {"substance", "thing"}
+        if token.kind == "thing" and ahead and ahead[0].text in COLORS and any(t.kind == "thing" for t in result):
+            continue  # "a mailbox in robin egg blue"
+        if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
+            continue  # "candy apple red paint"
         if token.text in COLORS and token.kind in ("substance", "thing"):
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)
             if token.text in KNOWN and KNOWN[token.text][0].family != "gem":
@@ -185,6 +318,15 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("part", token.text, PARTS[token.text])
         result.append(token)
     return result
+
+
+def _shades(token: Token, after: list[Token]) -> bool:
+    """Whether a name only says which shade of a colour is meant, whose stuff follows."""
+    run = _run(after)
+    hue = next((k for k, t in enumerate(run) if t.kind != "thing"), 0)
+    plain = bool(run) and run[hue].kind == "color" and run[hue].text in COLORS
+    stuff = any(t.kind == "substance" for t in run[hue + 1 :])
+    return plain and stuff and (token.kind == "thing" or token.text not in GENERIC)
 
 
 def _run(tokens: Iterable[Token]) -> list[Token]:
@@ -213,8 +355,13 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("dyed", DYED)
     enter("size", TIMES)
     enter("filler", FILLER)
+    enter("degree", DEGREES)
+    enter("denial", DENIALS)
+    enter("join", {word: Join("and") for word in SPARED})
     enter("postfix", POSTFIX)
     enter("join", JOINS)
     enter("part", {f"{word} {place}": PARTS[place] for word in PLACED for place in PARTS} | {"on top of it": PARTS["top"]})
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
+    for known, *others in rows("spellings.tsv"):
+        table |= {other: table[known] for other in words(others[0]) if other not in table}
     return table, max(len(text.split()) for text in table)

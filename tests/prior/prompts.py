@@ -2,8 +2,13 @@
 
 where: a kind of mask, or several that would do ("up/patches"); "all" is the base. family: of the look ("*": any; "metal" alone
 is metallic). colour: sRGB. What a prompt calls for beyond this, such as grime, is not asked. FORMS were written as a user
-writes, before the tables were looked at for them; WORDS are single things, stuffs, finishes and wear.
+writes, before the tables were looked at for them; WORDS are single things, stuffs, finishes and wear. corpus.txt has
+prompts as artists, makers of games and researchers write them, of every form; each of its rows was judged by eye.
 """
+
+from pathlib import Path
+
+CORPUS = (Path(__file__).parent / "corpus.txt").read_text(encoding="utf-8")
 
 FORMS = """
 a boot, brown leather with a black rubber sole | all leather #5e3a22 | below plastic #222222

@@ -23,7 +23,7 @@ from stages.prior.stuffs import FAMILY_LOOKS, FINISH_LOOKS, KNOWN, LOOK_OF, look
 from stages.prior.tokens import JOINS, POSTFIX
 from stages.report.measures import color_difference
 from stages.report.prompts import PROMPTS
-from tests.prior.prompts import FORMS, WORDS, parsed
+from tests.prior.prompts import CORPUS, FORMS, WORDS, parsed
 
 WANTED = {s.look for stuffs in KNOWN.values() for s in stuffs}
 METALS = {s.look.split(" ")[-1] for stuffs in KNOWN.values() for s in stuffs if s.metallic}
@@ -82,6 +82,49 @@ def test_words_are_understood(read) -> None:  # type: ignore[no-untyped-def]
     missed = {prompt: wrong(read(prompt), wanted) for prompt, wanted in parsed(WORDS)}
     failed = {prompt: what for prompt, what in missed.items() if what}
     assert len(missed) >= 40 and len(failed) <= 0.05 * len(missed), failed
+
+
+def test_prompts_of_every_form_are_understood_as_they_were_judged(read) -> None:  # type: ignore[no-untyped-def]
+    missed = {prompt: wrong(read(prompt), wanted) for prompt, wanted in parsed(CORPUS)}
+    failed = {prompt: what for prompt, what in missed.items() if what}
+    assert len(missed) >= 300 and not failed, failed
+
+
+@pytest.mark.parametrize(
+    ("prompt", "same"),
+    [("iron anvil, no rust", "iron anvil"), ("stone statue without moss or lichen", "stone statue"),
+     ("rust-free iron anvil", "iron anvil"), ("not gold but silver", "silver"),
+     ("a steel bucket instead of a plastic one", "steel bucket"), ("shinier than glass, blue plastic", "shiny blue plastic"),
+     ("marbel", "marble"), ("lether", "leather"), ("a woodden crate", "a wooden crate"), ("alluminium", "aluminium"),
+     ("goldleaf", "gold leaf"), ("steelplate", "steel plate"), ("brassware", "brass"), ("Eichenholztisch", "oak table"),
+     ("red brick, 4k, pbr, unreal engine 5", "red brick"),
+     ("steel visible under chipped blue paint", "blue paint chipped to steel"),
+     ("matte, dark red paint", "matte dark red paint"), ("an iron radiator painted cream", "cream painted iron radiator")],
+)  # fmt: skip
+def test_one_thing_said_in_two_ways(read, prompt: str, same: str) -> None:  # type: ignore[no-untyped-def]
+    one, other = read(prompt), read(same)
+    assert [(c.look, c.color, c.roughness) for c in one.coats] == [(c.look, c.color, c.roughness) for c in other.coats]
+
+
+def test_how_much_of_it_is_heard(read) -> None:  # type: ignore[no-untyped-def]
+    little, some, much = (read(f"{degree}rusted steel").layers[0].masks[0].share for degree in ("slightly ", "", "heavily "))
+    assert 0 < little < some < much < 1
+    little, some = (read(f"a rock with {degree}moss").layers[0].masks[0].share for degree in ("a hint of ", ""))
+    assert 0 < little < some
+
+
+def test_what_lies_on_a_part_lies_nowhere_else(read) -> None:  # type: ignore[no-untyped-def]
+    dots = read("a mushroom, beige skin, with a red cap with white dots").layers[-1]
+    assert [mask.kind for mask in dots.masks] == ["above", "spots"]
+
+
+@pytest.mark.parametrize(
+    ("prompt", "look"),
+    [("corroded copper", "verdigris"), ("corroded iron pipe", "rust"), ("oxidized silver ring", "soil")],
+)
+def test_metals_corrode_as_they_do(read, prompt: str, look: str) -> None:  # type: ignore[no-untyped-def]
+    recipe = read(prompt)
+    assert look in [coat.look for coat in recipe.coats]
 
 
 def test_the_fixed_prompts_mean_what_they_truly_mean(read) -> None:  # type: ignore[no-untyped-def]
