@@ -36,7 +36,7 @@ OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" 
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test campaign hostile lint asset batch export bench beside clean
+.PHONY: help setup demo test campaign hostile uvs lint asset batch export bench beside clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -110,6 +110,9 @@ campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random mo
 
 hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through prep within their time (half an hour)
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.prep.hostile
+
+uvs: $(VENV)/.ready | $(CYCLES)  ## models laid out in fifteen ways: UVs kept bit for bit, and the same picture in Cycles (half an hour)
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.uv_campaign -o uvs $$(cat $(CYCLES))
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .

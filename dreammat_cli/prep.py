@@ -24,8 +24,9 @@ DEFAULT = defaults(PrepOptions)
               metavar="DEGREES", help="A sharper edge stays sharp where the file has no usable normals.")
 @click.option("--weld-tolerance", type=click.FloatRange(0, 0.1), default=DEFAULT["weld_tolerance"], show_default=True,
               metavar="DIAGONALS", help="Vertices closer than this are one.")
-@click.option("--uv", type=click.Choice(["auto", "keep", "new"]), default=DEFAULT["uv"], show_default=True,
-              help="Keep the source's UVs where they can be baked, insist on them, or always make new ones.")
+@click.option("--uv", type=click.Choice(["auto", "keep", "mend", "new"]), default=DEFAULT["uv"], show_default=True,
+              help="Keep the source's UVs where they give texels to the surface, insist on them, also give the few faces "
+                   "without texels charts in free space, or always make new ones.")
 @click.option("--unwrap-seconds", type=click.FloatRange(0), default=DEFAULT["unwrap_seconds"], show_default=True,
               metavar="SECONDS", help="Time that xatlas may take before simpler charts are made.")
 @click.option("--unwrap-triangles", type=click.IntRange(0), default=DEFAULT["unwrap_triangles"], show_default=True,

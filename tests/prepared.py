@@ -38,6 +38,6 @@ def save_prep(path: Path, vertices: NDArray, triangles: NDArray, normals: NDArra
     }
     part = {"name": "mesh", "material": "material", "node": "mesh", "transform": np.eye(4).ravel().tolist()}
     extra = {"source_format": "obj", "source_name": "mesh", "uv_kept": False, "parts": [part], "groups": []}
-    extra |= {"passed_on": nothing_passed_on(), "findings": {}}
+    extra |= {"shared_texels": False, "passed_on": nothing_passed_on(), "findings": {}}
     save_npz(path, PREP, arrays, Provenance({}, None, {"mesh": seed or "0" * 64}, extra))
     return path

@@ -35,8 +35,11 @@ def gltf_uv(prep: Artifact) -> NDArray[np.float32]:
     uv = prep["loop_uv"].copy()
     uv[:, 1] = 1 - uv[:, 1]
     if keeps_gltf_uv(prep):
-        rows = prep["loop_source_uv"]
-        uv[rows >= 0] = np.nan_to_num(prep["source_uv"][rows[rows >= 0]].astype(np.float32), posinf=0, neginf=0)
+        with np.errstate(over="ignore"):
+            own = prep["source_uv"][prep["loop_source_uv"]].astype(np.float32)
+        turned = np.stack([own[:, 0], (1 - own[:, 1].astype(np.float64)).astype(np.float32)], 1)  # as `prep` does
+        same = (prep["loop_source_uv"] >= 0) & (turned == prep["loop_uv"]).all(1)
+        uv[same] = own[same]
     return uv
 
 

@@ -37,12 +37,13 @@ class Look:
 
     images: PNG files by name: "albedo" (sRGB), "orm" (linear: R occlusion, G roughness, B metallic) and, where there is
     relief, "normal" (linear). occlusion: whether R of "orm" holds any, for materials
-    that bring none. passed_on: what else the source's materials had.
+    that bring none. passed_on: what else the source's materials had. wrap: how the images go on beyond their edges.
     """
 
     images: dict[str, bytes]
     occlusion: bool = False
     passed_on: PassedOn = field(default_factory=PassedOn)
+    wrap: int = CLAMP
 
     def material(self, name: str) -> dict[str, Any]:
         """glTF's material; the textures baked here take the rows of `images`, those passed on the rows after them."""
@@ -60,7 +61,7 @@ class Look:
     def textures(self) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
         """glTF's textures and samplers; the first sampler is the baked textures' own."""
         samplers: list[dict[str, Any]] = [
-            {"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": CLAMP, "wrapT": CLAMP},
+            {"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": self.wrap, "wrapT": self.wrap},
         ]
         textures: list[dict[str, Any]] = [{"source": index, "sampler": 0} for index in range(len(self.images))]
         for texture in self.passed_on.textures:

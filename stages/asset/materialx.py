@@ -41,7 +41,7 @@ def graph(document: Any, stem: str, look: Look, files: dict[str, str]) -> Any:
         if space:
             file.setColorSpace(space)
         for mode in ("uaddressmode", "vaddressmode"):
-            node.setInputValue(mode, "clamp", "string")
+            node.setInputValue(mode, "periodic" if look.repeats else "clamp", "string")
         return node
 
     def output(name: str, kind: str, node: Any, channel: str = "") -> None:

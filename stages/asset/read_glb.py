@@ -24,6 +24,9 @@ SUFFIXES = {"image/png": ".png", "image/jpeg": ".jpg"}
 
 OPAQUE = 255
 
+REPEAT = 10497
+"""glTF's number for a texture that goes on beyond its edges."""
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -53,7 +56,7 @@ class Look:
     """A material of the model.
 
     pictures: of "albedo", "orm", "normal", "occlusion", "emission", those that it has. normal_scale: glTF's. emissive:
-    the factor on the picture.
+    the factor on the picture. repeats: whether pictures go on beyond their edges, instead of ending there.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Look:
     pictures: dict[str, Picture]
     normal_scale: float = 1.0
     emissive: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    repeats: bool = False
 
     def packed(self) -> NDArray[np.uint8]:
         """R occlusion (1 where there is none), G roughness, B metallic: (H, W, 3)."""
@@ -144,7 +148,7 @@ def read_model(path: Path) -> TexturedModel:
         views = [chunk[v.get("byteOffset", 0) :][: v["byteLength"]] for v in root["bufferViews"]]
         arrays = [_array(entry, views) for entry in root["accessors"]]
         pictures = [_picture(row, image, views) for row, image in enumerate(root["images"])]
-        looks = [_look(material, root["textures"], pictures) for material in root["materials"]]
+        looks = [_look(material, root, pictures) for material in root["materials"]]
         meshes = [[_primitive(p, arrays) for p in mesh["primitives"]] for mesh in root["meshes"]]
         roots = root["scenes"][root.get("scene", 0)]["nodes"]
         nodes = [node for index in roots for node in _nodes(root["nodes"], index, np.eye(4), meshes)]
@@ -171,8 +175,8 @@ def _picture(row: int, image: dict[str, Any], views: list[bytes]) -> Picture:
     return Picture(row, bytes(views[image["bufferView"]]), SUFFIXES[image["mimeType"]])
 
 
-def _look(material: dict[str, Any], textures: list[dict[str, Any]], pictures: list[Picture]) -> Look:
-    pbr = material["pbrMetallicRoughness"]
+def _look(material: dict[str, Any], root: dict[str, Any], pictures: list[Picture]) -> Look:
+    pbr, textures = material["pbrMetallicRoughness"], root["textures"]
     slots = {
         "albedo": pbr["baseColorTexture"],
         "orm": pbr["metallicRoughnessTexture"],
@@ -183,7 +187,9 @@ def _look(material: dict[str, Any], textures: list[dict[str, Any]], pictures: li
     found = {name: pictures[textures[slot["index"]]["source"]] for name, slot in slots.items() if slot is not None}
     red, green, blue = material.get("emissiveFactor", (0.0, 0.0, 0.0))
     scale = float(slots["normal"].get("scale", 1.0)) if slots["normal"] else 1.0
-    return Look(material.get("name", "material"), bool(material.get("doubleSided")), found, scale, (red, green, blue))
+    sampler = root["samplers"][textures[slots["albedo"]["index"]]["sampler"]]
+    name, sides = material.get("name", "material"), bool(material.get("doubleSided"))
+    return Look(name, sides, found, scale, (red, green, blue), sampler["wrapS"] == REPEAT)
 
 
 def _primitive(primitive: dict[str, Any], arrays: list[NDArray]) -> Primitive:

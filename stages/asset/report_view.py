@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from stages.asset.report_mesh import PageMesh, octahedral, steps
 from stages.core.albedo import MIN_COSINE, diffuse_table, specular_albedo
+from stages.core.tiles import repeats
 
 TABLE = (33, 64)
 """Roughness steps and cosine steps of the table of white albedos; viewer.js knows them too."""
@@ -40,10 +41,16 @@ def groups(mesh: PageMesh, set_of_look: list[int]) -> list[dict[str, int]]:
 
 
 def box(mesh: PageMesh) -> dict[str, Any]:
-    """The box that 16-bit positions lie in, and the radius of the sphere around the origin that holds all."""
+    """The boxes that 16-bit positions and UVs lie in, whether textures repeat, and the radius of the sphere that holds all."""
     used = mesh.positions[np.unique(mesh.triangles)]
     low, extent = used.min(0), float(np.ptp(used, axis=0).max()) or 1.0
-    return {"origin": low.astype(float).tolist(), "extent": extent, "radius": float(np.linalg.norm(used, axis=1).max())}
+    radius = float(np.linalg.norm(used, axis=1).max())
+    least, wide, beyond = [0.0, 0.0], 1.0, repeats(mesh.uv[mesh.triangles])
+    if beyond:
+        least, wide = mesh.uv.min(0).astype(float).tolist(), float(np.ptp(mesh.uv, axis=0).max())
+    return {
+        "origin": low.astype(float).tolist(), "extent": extent, "radius": radius, "uv_box": [*least, wide], "repeats": beyond,
+    }  # fmt: skip
 
 
 def light_data(light: PageLight) -> dict[str, Any]:
@@ -61,7 +68,7 @@ def packed(mesh: PageMesh, light: PageLight) -> tuple[list[dict[str, Any]], byte
     arrays: dict[str, NDArray] = {
         "position": steps((mesh.positions - np.array(frame["origin"])) / frame["extent"]),
         "normal": octahedral(mesh.normals).view(np.uint16),
-        "uv": steps(mesh.uv),
+        "uv": steps((mesh.uv - np.array(frame["uv_box"][:2], np.float32)) / np.float32(frame["uv_box"][2])),
         "triangles": mesh.triangles.reshape(-1, 1).astype(np.uint32),
         "environment": np.concatenate([shared_exponent(level).reshape(-1, 1) for level in light.levels]),
         "albedos": white_albedos().view(np.uint16).reshape(-1, 4),

@@ -111,7 +111,7 @@ def preview_surface(stage: Any, material: Any, look: Look, files: dict[str, str]
         shader.CreateInput("file", types.Asset).Set(f"./{files[role]}")
         shader.CreateInput("sourceColorSpace", types.Token).Set(space)
         for wrap in ("wrapS", "wrapT"):
-            shader.CreateInput(wrap, types.Token).Set("clamp")
+            shader.CreateInput(wrap, types.Token).Set("repeat" if look.repeats else "clamp")
         for name, value in (("scale", scale), ("bias", bias)):
             if value:
                 shader.CreateInput(name, types.Float4).Set(value)

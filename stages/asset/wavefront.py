@@ -62,16 +62,21 @@ def mtl(materials: list[str], relief: bool) -> str:
 
 
 def obj_uv(prep: Artifact) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """UVs to write, v up, and the row of each loop: the source's table where kept, else the distinct new ones.
+    """UVs to write, v up, and the row of each loop: the source's table where kept, and below it what its loops lack.
 
     Returns:
-        (N, 2); (L,), -1 for a loop without UV.
+        (N, 2); (L,).
     """
+    kept, row = prep["source_uv"][:0], np.full(len(prep["loop_uv"]), -1, np.int64)
     if prep.provenance.extra["uv_kept"]:
-        return prep["source_uv"], prep["loop_source_uv"].astype(np.int64)
-    bits = np.ascontiguousarray(prep["loop_uv"]).view(np.uint64)[:, 0]
-    _, first, row = np.unique(bits, return_index=True, return_inverse=True)
-    return prep["loop_uv"][first].astype(np.float64), row
+        kept, row = prep["source_uv"], prep["loop_source_uv"].astype(np.int64)
+        with np.errstate(over="ignore"):
+            row[(kept[row].astype(np.float32) != prep["loop_uv"]).any(1)] = -1
+    lacking = np.flatnonzero(row < 0)
+    bits = np.ascontiguousarray(prep["loop_uv"][lacking]).view(np.uint64)[:, 0]
+    _, first, made = np.unique(bits, return_index=True, return_inverse=True)
+    row[lacking] = len(kept) + made
+    return np.concatenate([kept, prep["loop_uv"][lacking[first]].astype(np.float64)]), row
 
 
 def obj_normals(prep: Artifact) -> tuple[NDArray[np.float32], NDArray[np.int64]]:

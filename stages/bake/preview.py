@@ -20,10 +20,11 @@ from stages.core.images import labelled
 from stages.core.parallel import in_parallel
 from stages.core.progress import Progress
 from stages.core.shading import Material, shade
+from stages.core.tiles import repeats
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer, facing, surface_points
 from stages.light.lights import preview_light
-from stages.light.lookup import look_up
+from stages.light.lookup import CLAMP, REPEAT, look_up
 from stages.light.scene import Hits, Scene
 from stages.light.transport import Quality, cached_light_set, light_transport
 
@@ -86,11 +87,16 @@ class Look:
     uv: NDArray[np.float32]
     maps: NDArray[np.float32]
 
+    @property
+    def wrap(self) -> int:
+        """How the textures go on beyond their edges, as in model.glb."""
+        return REPEAT if repeats(self.uv) else CLAMP
+
     def material(self, points: GBuffer, across: NDArray) -> NDArray[np.float32]:
         """Albedo, roughness and metallic (P, 5), the mean over a patch around each point. Args: across: of `footprint`."""
         uv = self.uv[points.triangle]
         middle, edges = np.einsum("pk,pkd->pd", points.barycentric, uv), np.einsum("pek,pkd->ped", across, uv)
-        return look_up(self.maps, middle, edges)[:, :5]
+        return look_up(self.maps, middle, edges, (self.wrap, self.wrap))[:, :5]
 
     def points(
         self, hits: Hits, directions: NDArray, mask: NDArray[np.bool_], c2w: NDArray, step: float

@@ -1,8 +1,9 @@
 """UV rasteriser: which triangle, and where on it, each texel and each sample inside a texel shows.
 
 Texel space: x = u * size to the right, y = (1 - v) * size down; texel (row, column) is the unit square whose centre
-lies at +0.5. A triangle *covers* a sample that lies in it, edges included; where several do, the lowest index wins.
-A triangle *touches* a texel whose open square it overlaps: that is the conservative coverage of a chart's rim.
+lies at +0.5. A triangle *covers* a sample that lies in it, edges included; where several do, the one drawn first wins
+(`stages.core.tiles`). A triangle *touches* a texel whose open square it overlaps: that is the conservative coverage of a
+chart's rim. One without area in UV is the segment that it has become, and touches what no other does.
 """
 
 from dataclasses import dataclass
@@ -11,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.parallel import compiled, in_parallel
+from stages.core.tiles import INSIDE, drawn
 
 BAND = 64
 """Rows of texels that one task rasterises."""
 
 SMALLEST_AREA = 1e-12
 """Triangles of less area, in texels squared, show nothing: their barycentric coordinates would be noise."""
-
-INSIDE = -1e-9
-"""A sample is inside when its barycentric coordinates reach this: rounding leaves no crack between neighbours."""
 
 
 @dataclass(frozen=True)
@@ -48,25 +47,38 @@ class Surface:
 
 @dataclass(frozen=True)
 class Layout:
-    """Triangles in texel space: corners (F, 3, 2), top and bottom (F,) of each; size of the texture, texels."""
+    """Triangles in texel space.
 
+    uv: (F, 3, 2) corners of each, wherever they lie. corners: (D, 3, 2) the copies on the texture, in the order in which they
+    are drawn, face (D,) of each, top and bottom (D,). size: of the texture, texels.
+    """
+
+    uv: NDArray[np.float64]
     corners: NDArray[np.float64]
+    face: NDArray[np.int32]
     top: NDArray[np.float64]
     bottom: NDArray[np.float64]
     size: int
 
     @staticmethod
-    def of(uv: NDArray[np.float32], size: int) -> "Layout":
-        """From UVs (F, 3, 2), v up."""
-        corners = uv.astype(np.float64)
-        corners[..., 1] = 1 - corners[..., 1]
-        corners *= size
+    def of(uv: NDArray[np.float32], size: int, charts: NDArray[np.int32] | None = None) -> "Layout":
+        """From UVs (F, 3, 2), v up, and charts (F,) in the order in which they represent what they share; None for any."""
+        copies = drawn(uv, np.zeros(len(uv), np.int32) if charts is None else charts)
+        corners = in_texels(copies.corners, size)
         a, b, c = corners[:, 0, 1], corners[:, 1, 1], corners[:, 2, 1]
-        return Layout(corners, np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c), size)
+        top, bottom = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        return Layout(in_texels(uv, size), corners, copies.face, top, bottom, size)
 
     def in_rows(self, rows: range) -> NDArray[np.int64]:
-        """Indices, ascending, of the triangles whose bounding box meets some rows."""
+        """Indices, ascending, of the copies whose bounding box meets some rows."""
         return np.flatnonzero((self.top <= rows.stop) & (self.bottom >= rows.start))
+
+
+def in_texels(uv: NDArray, size: int) -> NDArray[np.float64]:
+    """UVs (F, 3, 2), v up, in texel space."""
+    corners = uv.astype(np.float64)
+    corners[..., 1] = 1 - corners[..., 1]
+    return corners * size
 
 
 def bands(size: int) -> list[range]:
@@ -86,7 +98,9 @@ def touched_texels(layout: Layout) -> Surface:
 
     def rasterise(rows: range) -> None:
         band = slice(rows.start, rows.stop)
-        _touch(layout.corners, layout.in_rows(rows), rows.start, triangle[band], barycentric[band])
+        reached = layout.in_rows(rows)
+        _touch(layout.corners, layout.face, reached, rows.start, triangle[band], barycentric[band])
+        _touch_flat(layout.corners, layout.face, reached, rows.start, triangle[band], barycentric[band])
 
     in_parallel(rasterise, bands(size))
     return Surface(triangle, barycentric)
@@ -102,7 +116,8 @@ def covered_samples(layout: Layout, supersample: int, rows: range) -> Surface:
     """
     shape = (len(rows) * supersample, layout.size * supersample)
     triangle, barycentric = np.full(shape, -1, np.int32), np.zeros((*shape, 2), np.float32)
-    _cover(layout.corners, layout.in_rows(rows), supersample, rows.start * supersample, triangle, barycentric)
+    reached = layout.in_rows(rows)
+    _cover(layout.corners, layout.face, reached, supersample, rows.start * supersample, triangle, barycentric)
     return Surface(triangle, barycentric)
 
 
@@ -138,7 +153,7 @@ def _span(dx, dy, ax, above, reach, low, high):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _cover(corners, reached, samples, first, triangle, barycentric):  # type: ignore[no-untyped-def]
+def _cover(corners, face, reached, samples, first, triangle, barycentric):  # type: ignore[no-untyped-def]
     """Mark the samples that triangles cover; sample rows start at `first`."""
     rows, columns = triangle.shape
     t = np.empty((3, 2))
@@ -160,13 +175,13 @@ def _cover(corners, reached, samples, first, triangle, barycentric):  # type: ig
                 w1, w2 = dx[1] * across + dy[1] * above, dx[2] * across + dy[2] * above
                 w0 = 1 - w1 - w2
                 if triangle[i - first, j] < 0 and min(w0, w1, w2) >= INSIDE:
-                    triangle[i - first, j] = f
+                    triangle[i - first, j] = face[f]
                     barycentric[i - first, j, 0] = max(w0, 0.0)
                     barycentric[i - first, j, 1] = max(w1, 0.0)
 
 
 @compiled
-def _touch(corners, reached, first, triangle, barycentric):  # type: ignore[no-untyped-def]
+def _touch(corners, face, reached, first, triangle, barycentric):  # type: ignore[no-untyped-def]
     """Mark the texels that triangles touch with the touching point nearest to their centres."""
     rows, columns = triangle.shape
     nearest = np.full((rows, columns), np.inf)
@@ -188,8 +203,33 @@ def _touch(corners, reached, first, triangle, barycentric):  # type: ignore[no-u
                 distance, w0, w1 = _nearest(t, dx, dy, half, j + 0.5, i + 0.5)
                 if distance < nearest[i - first, j]:
                     nearest[i - first, j] = distance
-                    triangle[i - first, j] = f
+                    triangle[i - first, j] = face[f]
                     barycentric[i - first, j, 0], barycentric[i - first, j, 1] = w0, w1
+
+
+@compiled
+def _touch_flat(corners, face, reached, first, triangle, barycentric):  # type: ignore[no-untyped-def]
+    """Mark the texels that only triangles without area touch, with a point of the longest edge."""
+    rows, columns = triangle.shape
+    for f in reached:
+        t = corners[f]
+        if abs(_edges(t)[2]) > 2 * SMALLEST_AREA:
+            continue
+        p, longest = 0, -1.0
+        for k in range(3):
+            q = (k + 1) % 3
+            length = np.hypot(t[q, 0] - t[k, 0], t[q, 1] - t[k, 1])
+            if length > longest:
+                p, longest = k, length
+        q = (p + 1) % 3
+        steps = int(np.ceil(2 * longest)) + 1
+        for k in range(steps):
+            s = (k + 0.5) / steps
+            i, j = int(np.floor(t[p, 1] + s * (t[q, 1] - t[p, 1]))), int(np.floor(t[p, 0] + s * (t[q, 0] - t[p, 0])))
+            if 0 <= i - first < rows and 0 <= j < columns and triangle[i - first, j] < 0:
+                triangle[i - first, j] = face[f]
+                barycentric[i - first, j, 0] = 1 - s if p == 0 else (s if q == 0 else 0.0)
+                barycentric[i - first, j, 1] = 1 - s if p == 1 else (s if q == 1 else 0.0)
 
 
 @compiled

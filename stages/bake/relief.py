@@ -44,7 +44,7 @@ def relief_normals(
     steps = jacobians(layout, positions)
     carry = inverse_steps(steps)
     slope = np.zeros((*height.shape, 2), np.float32)
-    _slopes(height, surface.triangle, surface.barycentric, charts, layout.corners, positions, steps, slope)
+    _slopes(height, surface.triangle, surface.barycentric, charts, layout.uv, positions, steps, slope)
     result = np.zeros((*height.shape, 3), np.float32)
     result[..., 2] = 1
     for row in range(len(height)):  # one row at a time: the whole of it would take a hundred times the map's bytes
@@ -81,7 +81,7 @@ def in_frame(m: NDArray, t: NDArray, b: NDArray, n: NDArray) -> NDArray[np.float
 
 def jacobians(layout: Layout, positions: NDArray[np.float32]) -> NDArray[np.float64]:
     """World step of each triangle for a texel to the right and one down, (F, 3, 2); 0 for one without area in UV."""
-    p, t = positions.astype(np.float64), layout.corners
+    p, t = positions.astype(np.float64), layout.uv
     edges = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], -1)  # (F, 3, 2)
     (a, c), (b, d) = (t[:, 1] - t[:, 0]).T, (t[:, 2] - t[:, 0]).T
     area = a * d - b * c
@@ -119,6 +119,7 @@ def _slopes(height, triangle, barycentric, charts, layout, positions, steps, slo
                     continue
                 dx = _at(layout, g, barycentric[y, x], 0) - _at(layout, f, barycentric[i, j], 0)
                 dy = _at(layout, g, barycentric[y, x], 1) - _at(layout, f, barycentric[i, j], 1)
+                dx, dy = dx - columns * np.rint(dx / columns), dy - rows * np.rint(dy / rows)  # whole tiles apart is beside
                 apart, expected = 0.0, 0.0
                 for d in range(3):
                     apart += (_at(positions, g, barycentric[y, x], d) - _at(positions, f, barycentric[i, j], d)) ** 2

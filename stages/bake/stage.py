@@ -25,7 +25,7 @@ from stages.bake.raster import Layout, Surface, touched_texels
 from stages.bake.relief import relief_normals
 from stages.bake.studio import write_studio
 from stages.bake.texels import Texels
-from stages.bake.visibility import Views, is_open, patches, seen_points
+from stages.bake.visibility import Views, is_open, patches, seen_elsewhere, seen_points
 from stages.core.artifact import (
     Artifact,
     Provenance,
@@ -44,6 +44,8 @@ from stages.core.errors import ArtifactError, OutputError
 from stages.core.images import write_png
 from stages.core.progress import Progress, silent
 from stages.core.schemas import ASSET, MATERIAL, PREP
+from stages.core.tiles import repeats, signed_area
+from stages.light.lookup import CLAMP, REPEAT
 from stages.light.scene import Scene
 from stages.material.learnt import LearntMaterial
 from stages.material.relief import bounded
@@ -76,9 +78,9 @@ class Subject:
     @staticmethod
     def of(prep: Path, mesh: Artifact, size: int) -> "Subject":
         """From prep.npz. Raises: ArtifactError when no texel of the texture would show any surface."""
-        layout = Layout.of(mesh["uv"], size)
+        layout = Layout.of(mesh["uv"], size, mesh["charts"])
         touched = touched_texels(layout)
-        if not (touched.triangle >= 0).any():
+        if not signed_area(mesh["uv"]).any() or not (touched.triangle >= 0).any():
             raise ArtifactError(f"{prep}: its UVs cover no texel of {size}; make it again with new UVs")
         scene = traced_scene(mesh)
         return Subject(mesh, scene, is_open(mesh["triangles"]), layout, touched)
@@ -202,6 +204,8 @@ def mend_unseen(subject: Subject, views: Views, residual: NDArray[np.float32], p
     surface, groups = subject.touched.where(on_chart), patches(subject.touched, subject.mesh["charts"])
     first = surface[groups.first]
     seen = seen_points(subject.scene, first, views, subject.open)
+    if subject.mesh.provenance.extra["shared_texels"]:
+        seen |= seen_elsewhere(subject.scene, subject.layout, subject.mesh["charts"], groups, views, subject.open)
     texel_seen = seen[groups.of_texel]
     if seen.any() and not seen.all():
         progress("filling", 0, 1)
@@ -227,7 +231,7 @@ def write_asset(
     is_obj = mesh.provenance.extra["source_format"] == "obj"
     files = write_textures(out, maps, grey=is_obj)
     names = {part["material"] for part in mesh.provenance.extra["parts"]}
-    look = look_of(out, maps, PassedOn.of(mesh))
+    look = look_of(out, maps, PassedOn.of(mesh), REPEAT if repeats(mesh["uv"]) else CLAMP)
     normal_mapped = set(look.passed_on.normal_maps()) if maps.normal is None else names
     model = source_model(mesh, subject.open, normal_mapped)
     write_glb(out / "model.glb", model, look)
@@ -240,12 +244,16 @@ def write_asset(
     return files, model.notes
 
 
-def look_of(folder: Path, maps: Maps, passed_on: PassedOn) -> Look:
-    """What model.glb's materials show: the PNGs in the folder, and what the source brings that they do not replace."""
+def look_of(folder: Path, maps: Maps, passed_on: PassedOn, wrap: int = CLAMP) -> Look:
+    """What model.glb's materials show: the PNGs in the folder, and what the source brings that they do not replace.
+
+    Args:
+        wrap: how the textures go on beyond their edges, glTF's number.
+    """
     names = ["albedo", "orm"] + ["normal"] * (maps.normal is not None)
     passed_on = passed_on if maps.normal is None else passed_on.without("normalTexture")
     images = {name: (folder / f"{name}.png").read_bytes() for name in names}
-    return Look(images, maps.occlusion is not None, passed_on)
+    return Look(images, maps.occlusion is not None, passed_on, wrap)
 
 
 def describe(mesh: Artifact, made: Artifact) -> dict[str, Any]:

@@ -106,7 +106,7 @@ def texel_size(corners: NDArray[np.float32], layout: Layout) -> NDArray[np.float
     """Edge of a texel on each triangle, world units, (F,): the root of its area by its area in texels."""
     a, b = (corners[:, k].astype(np.float64) - corners[:, 0] for k in (1, 2))
     area = np.linalg.norm(np.cross(a, b), axis=1)
-    p, q = (layout.corners[:, k] - layout.corners[:, 0] for k in (1, 2))
+    p, q = (layout.uv[:, k] - layout.uv[:, 0] for k in (1, 2))
     texels = abs(p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0])
     known = (texels > 1e-6) & (area > 0)
     size = np.sqrt(area / np.where(known, texels, 1))

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.bake.raster import Surface
+from stages.bake.raster import Layout, Surface
 from stages.core.frames import project
 from stages.core.parallel import in_parallel
+from stages.core.tiles import Representatives, signed_area
 from stages.light.scene import OFFSET, Scene
 
 GRID = 512
@@ -20,6 +21,9 @@ GRID = 512
 
 MIN_COSINE = 0.05
 """Surface seen at a flatter angle than this, 3 degrees, was not seen: a pixel there smears over twenty."""
+
+STREWN, MOST_STREWN = 4, 1 << 20
+"""Points for each patch that tell where shared texels are seen elsewhere, and all of them at most."""
 
 RAYS_PER_TASK = 1 << 14
 
@@ -49,9 +53,11 @@ class Views:
 class Patches:
     """Texels grouped by chart and grid cell.
 
-    first: (K,) index, among the texels on charts row by row, of each patch's first texel. of_texel: (N,) patch of each.
+    key: (K,) chart and cell of each, ascending. first: (K,) index, among the texels on charts row by row, of each patch's first
+    texel. of_texel: (N,) patch of each.
     """
 
+    key: NDArray[np.int64]
     first: NDArray[np.int64]
     of_texel: NDArray[np.int64]
 
@@ -65,10 +71,34 @@ def patches(touched: Surface, charts: NDArray[np.int32]) -> Patches:
     """Group the texels on charts. Args: touched: (size, size). charts: (F,) chart of each triangle."""
     size = len(touched.triangle)
     row, column = np.nonzero(touched.triangle >= 0)
-    cell = (row * GRID // size) * GRID + column * GRID // size
-    chart = charts[touched.triangle[row, column]].astype(np.int64)
-    _, first, of_texel = np.unique(chart * GRID**2 + cell, return_index=True, return_inverse=True)
-    return Patches(first, of_texel)
+    key = _key(charts[touched.triangle[row, column]], row, column, size)
+    return Patches(*np.unique(key, return_index=True, return_inverse=True))
+
+
+def _key(chart: NDArray, row: NDArray, column: NDArray, size: int) -> NDArray[np.int64]:
+    """Chart and cell of texels as one number."""
+    return chart.astype(np.int64) * GRID**2 + (row * GRID // size) * GRID + column * GRID // size
+
+
+def seen_elsewhere(
+    scene: Scene, layout: Layout, charts: NDArray[np.int32], groups: Patches, views: Views, open_mesh: bool
+) -> NDArray[np.bool_]:
+    """Patches (K,) whose texels some other place of the surface shows that a view saw, told by points strewn over the UVs."""
+    uv = layout.uv / layout.size
+    uv[..., 1] = 1 - uv[..., 1]
+    area, rng = np.abs(signed_area(uv)), np.random.default_rng(0)
+    count = int(min(STREWN * len(groups.key) * max(area.sum(), 1.0), MOST_STREWN))
+    face = rng.choice(len(uv), count, p=area / area.sum()).astype(np.int32)
+    weights = rng.dirichlet((1, 1, 1), count)
+    found, theirs = Representatives(uv, charts).of(face, weights)
+    place = np.einsum("pk,pkd->pd", theirs, layout.uv[found])
+    column, row = np.floor(place % layout.size).astype(np.int64).clip(max=layout.size - 1).T
+    key = _key(charts[found], row, column, layout.size)
+    patch = np.searchsorted(groups.key, key).clip(max=len(groups.key) - 1)
+    other = (groups.key[patch] == key) & (found != face)
+    seen = np.zeros(len(groups.key), bool)
+    seen[patch[other][seen_points(scene, Surface(face[other], weights[other, :2].astype(np.float32)), views, open_mesh)]] = True
+    return seen
 
 
 def seen_points(scene: Scene, surface: Surface, views: Views, open_mesh: bool) -> NDArray[np.bool_]:

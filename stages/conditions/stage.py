@@ -33,6 +33,7 @@ from stages.core.errors import InputError, NumericalError, OutputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import CAMERAS, CONDITIONS, PREP, SURVEY
 from stages.core.shading import KNOTS, Transport
+from stages.core.tiles import Representatives
 from stages.core.views import (
     SD,
     Geometry,
@@ -95,6 +96,7 @@ def conditions(
         survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.occluded)
         save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None
+        shared = Representatives(mesh["uv"], mesh["charts"]) if mesh.provenance.extra["shared_texels"] else None
         quality, expected = QUALITY[options.quality], None
         if options.error:
             progress("choosing rays", 0, 1)
@@ -106,7 +108,7 @@ def conditions(
             written = None
             for i, view in enumerate(missing):
                 progress("views", options.views - made + i, options.views)
-                traced = trace(view, scene, smooth, cameras, lights, quality, options)
+                traced = trace(view, (scene, smooth, shared), cameras, lights, quality, options)
                 if written:
                     written.result()
                 written = writer.submit(write, out, view, lights, traced, options)
@@ -205,25 +207,31 @@ class View:
 
 def trace(
     view: int,
-    scene: Scene,
-    smooth: Scene | None,
+    subject: tuple[Scene, Scene | None, Representatives | None],
     cameras: Cameras,
     lights: list[Environment],
     quality: Quality,
     options: ConditionsOptions,
 ) -> View:
-    """One view under every environment. Args: smooth: the scene of the profile sd. Raises: NumericalError."""
+    """One view under every environment.
+
+    Args:
+        subject: the scene; that of the profile sd; where texels are shared, by what.
+    Raises: NumericalError.
+    """
+    scene, smooth, shared = subject
     camera = cameras.c2w[view], float(cameras.fov_y[view]), options.size, options.size
     points, seed = trace_view(scene, *camera), options.seed * 1_000_003 + view
     transports = light_transport(scene, points, lights, quality, seed)
     for light, transport in zip(lights, transports, strict=True):
         check_finite(transport, light.name, view, options.seed)
-    geometry = Geometry(points.mask, points.depth, view_normals(points, camera[0]))
+    shown = None if shared is None else shown_points(scene, points, shared)
+    geometry = Geometry(points.mask, points.depth, view_normals(points, camera[0]), shown)
     if smooth is None:
         return View(geometry, transports)
     points = trace_view(smooth, *camera)
     maps = blender_light_maps(smooth, points, lights, quality, seed)
-    return View(geometry, transports, replace(geometry, normal=view_normals(points, camera[0])), maps)
+    return View(geometry, transports, replace(geometry, normal=view_normals(points, camera[0]), shown=None), maps)
 
 
 def write(out: Path, view: int, lights: list[Environment], traced: View, options: ConditionsOptions) -> None:
@@ -244,6 +252,17 @@ def view_normals(points: GBuffer, c2w: NDArray) -> NDArray[np.float32]:
     """Shading normals in the camera's frame. Returns: (H, W, 3), 0 off the object."""
     image = np.zeros((*points.mask.shape, 3), np.float32)
     image[points.mask] = points.n @ c2w[:3, :3].astype(np.float32)
+    return image
+
+
+def shown_points(scene: Scene, points: GBuffer, shared: Representatives) -> NDArray[np.float32]:
+    """What represents each pixel, as in `Geometry.shown`: (H, W, 7), 0 off the object."""
+    triangle, weights = shared.of(points.triangle, points.barycentric)
+    corners = scene.vertices[scene.triangles].astype(np.float64)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    scale = shared.scale(area, points.triangle, triangle)
+    image = np.zeros((*points.mask.shape, 7), np.float32)
+    image[points.mask] = np.c_[scene.point(triangle, weights), scene.smooth_normal(triangle, weights), scale]
     return image
 
 

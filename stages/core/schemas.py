@@ -7,14 +7,14 @@ from stages.core.artifact import Field, Schema
 
 PREP = Schema(
     "dreammat.prep",
-    2,
+    3,
     {
         # the working mesh: normalised world frame, welded, outward, triangles
         "vertices": Field("f4", ("V", 3)),
         "triangles": Field("i4", ("F", 3), rows_of="V"),
         "normals": Field("f4", ("F", 3, 3)),  # unit shading normal per triangle corner
-        "uv": Field("f4", ("F", 3, 2)),  # per triangle corner, [0, 1], v up
-        "charts": Field("i4", ("F",)),  # UV chart of each triangle, from 0
+        "uv": Field("f4", ("F", 3, 2)),  # per triangle corner, v up; in any whole tile of the plane: textures repeat
+        "charts": Field("i4", ("F",)),  # UV chart of each triangle, from 0; of those that share texels the lowest represents
         "triangle_loops": Field("i4", ("F", 3), rows_of="L"),  # the source loop of each triangle corner
         # the source, as it was
         "to_world": Field("f8", (4, 4)),  # source frame (node transforms applied) to world
@@ -30,12 +30,13 @@ PREP = Schema(
         "loop_source_tangent": Field("i4", ("L",), rows_of="SG", least=-1),  # row of source_tangents, or -1
         "face_part": Field("i4", ("P",)),  # entry of extra["parts"]
         "face_group": Field("i4", ("P",)),  # entry of extra["groups"], or -1
-        "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, [0, 1], v up
+        "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, v up
     },
     # source_format: "obj" | "ply" | "stl" | "off" | "glb" | "fbx" | "usd"; uv_kept: bool; findings: what was found and mended;
     # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row)}
+    # shared_texels: whether a texel may show more than one place, see `core.tiles`
     # groups: names of an OBJ's groups; passed_on: what materials of a glTF had besides, see `stages.asset.passed_on`
-    extra=("source_format", "source_name", "uv_kept", "parts", "groups", "passed_on", "findings"),
+    extra=("source_format", "source_name", "uv_kept", "shared_texels", "parts", "groups", "passed_on", "findings"),
 )
 
 CAMERAS = Schema(

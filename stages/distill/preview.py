@@ -40,8 +40,8 @@ def _row(views: Views, view: int, environment: int, base: Base, residual: Residu
     shown = np.flatnonzero((row % stride == 0) & (column % stride == 0))
     surface = views.surface(view, shown)
     transport = views.read_transport((view, environment))[torch.from_numpy(shown)].to(device, torch.float32)
-    footprint = torch.from_numpy(stride * views.footprint(view, surface.depth.numpy()))
-    material = base.material(residual, *(t.to(device) for t in (surface.points, surface.normals, footprint)))
+    where = (surface.shown, surface.shown_normals, stride * views.widths(view, surface))
+    material = base.material(residual, *(t.to(device) for t in where))
     scale = EXPOSURE / transport.E.mean().clamp(min=1e-6)
     pictures = (
         srgb_encode(reinhard(scale * shade(transport, material))),

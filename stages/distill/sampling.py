@@ -26,7 +26,7 @@ WHOLE_VIEW_SHARE = 0.5
 class Images:
     """How a sample's P points lie in its B square images of S pixels.
 
-    pixel: (P,) flat index into B x S x S. surface: depth and normal of the points. azimuth, elevation: (B,) of the
+    pixel: (P,) flat index into B x S x S. surface: of the points that are seen. azimuth, elevation: (B,) of the
     cameras, radians, the front of the object at azimuth 0. maps: where the conditions have the profile sd, view-space
     normals (P, 3) and light maps (P, 6, 3) of it.
     """
@@ -47,7 +47,8 @@ class Images:
 
 @dataclass(frozen=True)
 class Sample:
-    """What one step shows: P points (P, 3) with normals (P, 3) and footprints (P,), world, each under `lights` = L lights.
+    """What one step shows: P points, each under `lights` = L lights. points, normals: (P, 3) world, where their material is
+    asked for (on shared texels what represents them). footprint: (P,) there.
 
     transport: of P L rows, all lights of a point after each other. source: (view, environment) of each image, for messages.
     images: the layout of crops; rows: (P,) of loose pixels in their pool. The one that does not apply is None. given: what the
@@ -99,7 +100,7 @@ class CropSampler:
         lights = [self._views.transport(*key)[torch.from_numpy(rows)] for key, (rows, *_) in zip(keys, crops, strict=True)]
         surfaces = [self._views.surface(key[0], rows) for key, (rows, *_) in zip(keys, crops, strict=True)]
         footprint = [
-            torch.from_numpy(stride * self._views.footprint(key[0], surface.depth.numpy()))
+            stride * self._views.widths(key[0], surface)
             for key, surface, (*_, stride) in zip(keys, surfaces, crops, strict=True)
         ]
         surface = Surface(*(self._join(surfaces, name) for name in Surface.__annotations__))
@@ -110,7 +111,7 @@ class CropSampler:
         where = torch.from_numpy(pixel).to(self._device)
         images = Images(self._batch, self._size, where, surface, azimuth, elevation, self._maps(keys, crops))
         width = torch.cat(footprint).to(self._device)
-        return Sample(surface.points, surface.normals, width, 1, transport, tuple(keys), images=images)
+        return Sample(surface.shown, surface.shown_normals, width, 1, transport, tuple(keys), images=images)
 
     def _maps(
         self, keys: list[tuple[int, int]], crops: list[tuple[NDArray[np.int64], NDArray[np.int64], int]]
@@ -165,7 +166,7 @@ class PixelSampler:
     The pool holds all of them, or as many of each view as the byte budget allows, chosen at random. Draws are even over
     the surface, not over the pixels: a crevice that few views see counts as much as a flank that all of them do.
 
-    points, normals, eyes: (M, 3) world; eyes are the cameras' positions. footprint: (M,).
+    points, eyes: (M, 3) world, what is seen and the cameras' positions.
     """
 
     def __init__(self, views: Views, count: int, generator: torch.Generator, device: torch.device) -> None:
@@ -173,9 +174,9 @@ class PixelSampler:
         share = min(1.0, CACHE_BYTES / _pool_bytes(views))
         rows = [_subset(len(views.pixels(view)), share, generator) for view in views.seen]
         surfaces = [views.surface(view, chosen) for view, chosen in zip(views.seen, rows, strict=True)]
-        self.points, self.normals = (torch.cat([getattr(s, name) for s in surfaces]) for name in ("points", "normals"))
-        widths = [views.footprint(view, s.depth.numpy()) for view, s in zip(views.seen, surfaces, strict=True)]
-        self.footprint = torch.from_numpy(np.concatenate(widths))
+        self.points, *shown = (torch.cat([getattr(s, name) for s in surfaces]) for name in ("points", "shown", "shown_normals"))
+        widths = [views.widths(view, s) for view, s in zip(views.seen, surfaces, strict=True)]
+        self._where = (*shown, torch.cat(widths))  # points, normals and footprints of the material
         eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
         self.eyes = torch.from_numpy(eyes.astype(np.float32))
         self._lights = _pooled_lights(views, rows)  # (M, L, WIDTH)
@@ -187,7 +188,7 @@ class PixelSampler:
 
     def at(self, rows: Tensor) -> Sample:
         """The sample of given rows (P,) of the pool."""
-        points, normals, footprint = (t.index_select(0, rows) for t in (self.points, self.normals, self.footprint))
+        points, normals, footprint = (t.index_select(0, rows) for t in self._where)
         lights = self._lights.index_select(0, rows)
         packed = lights.to(self.device).float().flatten(0, 1)
         transport = Transport.unpack(packed)

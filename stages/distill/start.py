@@ -57,9 +57,9 @@ def random_rows(views: Views, chosen: list[int], count: int, generator: torch.Ge
 
 
 def surface_at(views: Views, rows: Rows) -> tuple[Tensor, Tensor]:
-    """Points and normals of pixels, (P, 3) each."""
+    """Points and normals (P, 3) at which the material of pixels is asked for."""
     surfaces = [views.surface(view, chosen.numpy()) for view, chosen in rows]
-    return torch.cat([s.points for s in surfaces]), torch.cat([s.normals for s in surfaces])
+    return torch.cat([s.shown for s in surfaces]), torch.cat([s.shown_normals for s in surfaces])
 
 
 def random_points(views: Views, chosen: list[int], count: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:

@@ -40,12 +40,19 @@ Light = TypeVar("Light", Transport, Tensor)
 
 @dataclass(frozen=True)
 class Surface:
-    """Surface points: position and unit normal in the world (P, 3), planar depth (P,), view-space normal (P, 3)."""
+    """Surface points: position and unit normal in the world (P, 3), planar depth (P,), view-space normal (P, 3).
+
+    shown, shown_normals: (P, 3) where the material of each is asked for: the point itself, or what represents its texel.
+    scale: (P,) how many times larger the texture lies there.
+    """
 
     points: Tensor
     normals: Tensor
     depth: Tensor
     view_normals: Tensor
+    shown: Tensor
+    shown_normals: Tensor
+    scale: Tensor
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,7 @@ class _Geometry:
     pixels: NDArray[np.int32]  # (P,) flat index of each object pixel, ascending
     depth: NDArray[np.float32]  # (P,)
     normal: NDArray[np.float16]  # (P, 3) view space
+    shown: NDArray[np.float32] | None  # (P, 7) as in `core.views.Geometry`
 
 
 class Views:
@@ -95,6 +103,10 @@ class Views:
         """Width of a pixel of a view at planar depths (P,), world units."""
         return np.asarray(2 * depth * np.tan(self.fov_y[view] / 2) / self.height, np.float32)
 
+    def widths(self, view: int, surface: Surface) -> Tensor:
+        """Footprints (P,) at which the material of surface points of a view is asked for, world units."""
+        return torch.from_numpy(self.footprint(view, surface.depth.numpy())) * surface.scale
+
     def surface(self, view: int, rows: NDArray[np.int64]) -> Surface:
         """The points of some object pixels of a view. Args: rows (K,) into `pixels(view)`."""
         geometry = self._geometry[view]
@@ -105,7 +117,9 @@ class Views:
         local = np.stack([x, y, -np.ones(len(rows))], -1) * geometry.depth[rows, None]  # camera space
         rotation, eye = self.c2w[view][:3, :3], self.c2w[view][:3, 3]
         normal = geometry.normal[rows].astype(np.float64)
-        arrays = (local @ rotation.T + eye, normal @ rotation.T, geometry.depth[rows], normal)
+        point, turned = local @ rotation.T + eye, normal @ rotation.T
+        shown = np.c_[point, turned, np.ones(len(rows))] if geometry.shown is None else geometry.shown[rows]
+        arrays = (point, turned, geometry.depth[rows], normal, shown[:, :3], shown[:, 3:6], shown[:, 6])
         return Surface(*(torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in arrays))
 
     def transport(self, view: int, environment: int) -> Transport:
@@ -137,7 +151,8 @@ class Views:
             if geometry.mask.shape != (self.height, self.width):
                 raise ArtifactError(f"{self.folder}: view {view} is not {self.width} x {self.height}; make it again")
             normal = geometry.normal.reshape(-1, 3)[mask].astype(np.float16)
-            return _Geometry(np.flatnonzero(mask).astype(np.int32), geometry.depth.ravel()[mask], normal)
+            shown = None if geometry.shown is None else geometry.shown.reshape(-1, 7)[mask]
+            return _Geometry(np.flatnonzero(mask).astype(np.int32), geometry.depth.ravel()[mask], normal, shown)
 
         with ThreadPoolExecutor(READERS) as pool:
             return list(pool.map(read, range(len(self.c2w))))

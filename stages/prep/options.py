@@ -13,7 +13,8 @@ class PrepOptions:
         texture of 2048) that is worth what it takes from the charts.
     crease_angle: a sharper edge between two faces stays sharp where the file has no usable normals, degrees.
     weld_tolerance: vertices closer than this are one, in diagonals of the bounding box.
-    uv: "auto" keeps the source's UVs where they can be baked, "keep" insists on them, "new" always makes new ones.
+    uv: "auto" keeps the source's UVs where they give texels to the surface, "keep" insists on them, "mend" also gives the faces
+        without texels charts in free space, "new" always makes new ones.
     unwrap_seconds: after this, xatlas is stopped and the charts are made by direction of the normal instead.
     unwrap_triangles: a larger mesh does not try xatlas, which there takes minutes and packs no denser.
     """

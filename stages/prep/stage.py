@@ -12,8 +12,11 @@ from stages.core.artifact import Provenance, peek, plain_options, run_log, save_
 from stages.core.errors import InputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
+from stages.core.tiles import flat
 from stages.prep.gltf_file import companions
+from stages.prep.layout import Kept, keep, unusable, with_neighbours
 from stages.prep.measure import topology
+from stages.prep.mend import mended
 from stages.prep.normals import authored, face_normals, shading_normals
 from stages.prep.options import PrepOptions
 from stages.prep.orient import outward
@@ -28,7 +31,7 @@ from stages.prep.repair import Working, repair
 from stages.prep.source import Source, nothing_passed_on
 from stages.prep.topology import components, edges
 from stages.prep.unwrap import unwrap
-from stages.prep.uv import loop_uvs, signed_area, stretch, unusable, uv_charts
+from stages.prep.uv import loop_uvs, signed_area, stretch, uv_charts
 
 READERS: dict[str, Callable[[Path], Source]] = {
     ".obj": read_obj, ".ply": read_ply, ".stl": read_stl, ".off": read_off, ".glb": read_gltf, ".gltf": read_gltf,
@@ -66,9 +69,10 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
         normals, findings = oriented(source, working, options.crease_angle)
         progress("unwrap", 2, 4)
         source, layout = _with_bakeable_uv(source, working, options, mesh)
-        loop_uv, kept, way = _texture(source, working, options, layout["unusable_uv"])
-        uv = loop_uv[working.loops]
-        chart = uv_charts(working.triangles, uv)
+        loop_uv, way = _texture(source, working, options, layout["unusable_uv"], mesh)
+        kept, uv = layout["unusable_uv"] is None, loop_uv[working.loops]
+        found = _charts(source, working, uv, layout["unusable_uv"])
+        chart, way["uv"] = found.chart, "; ".join(found.told)
         measured = topology(working.vertices, working.triangles)
         findings = _findings(source, working, findings, layout | way) | measured | {
             "charts": int(chart.max()) + 1,
@@ -81,6 +85,7 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
             "source_format": source.format,
             "source_name": mesh.name,
             "uv_kept": kept,
+            "shared_texels": found.shared,
             "parts": [asdict(part) for part in source.parts],
             "groups": source.groups,
             "passed_on": source.passed_on if kept else nothing_passed_on(),
@@ -135,28 +140,55 @@ def _with_bakeable_uv(
     _, area = face_normals(working.vertices, working.triangles)
     problems = []
     for number, candidate in enumerate(source.by_uv_set()):
-        problems.append(unusable(loop_uvs(candidate)[working.loops], area))
+        problems.append(unusable(working.triangles, loop_uvs(candidate)[working.loops], area))
         if problems[-1] is None:
             return candidate, {"unusable_uv": None, "uv_set": number}
-    if options.uv == "keep":
+    if options.uv in ("keep", "mend"):
         raise InputError(f"{path}: its UVs cannot be kept: {problems[0]}; mend them or let new ones be made")
     return source, {"unusable_uv": problems[0], "uv_set": None}
 
 
 def _texture(
-    source: Source, working: Working, options: PrepOptions, problem: str | None
-) -> tuple[NDArray[np.float32], bool, dict[str, Any]]:
-    """UVs of all source loops (L, 2), whether they are the source's, and how they came about."""
-    if problem is None:
-        return _everywhere(loop_uvs(source), working), True, {"unwrap": "kept", "gutter": None}
+    source: Source, working: Working, options: PrepOptions, problem: str | None, path: Path
+) -> tuple[NDArray[np.float32], dict[str, Any]]:
+    """UVs of all source loops (L, 2), the source's where nothing is wrong with them, and how they came about.
+
+    Raises: InputError where some are to be mended and there is no room.
+    """
     polygon = np.searchsorted(source.loop_start, working.loops[:, 0], "right") - 1
+    if problem is None:
+        uv = loop_uvs(source)
+        if options.uv == "mend":
+            uv[working.loops] = _mended(uv[working.loops], working, polygon, path)
+        uv[working.loops] = with_neighbours(uv[working.loops], working.triangles, polygon)
+        return _everywhere(uv, working), {"unwrap": "kept", "gutter": None}
     seconds = options.unwrap_seconds if len(polygon) <= options.unwrap_triangles else 0.0
     layout = unwrap(
         working.vertices, working.triangles, polygon, options.texture_size, options.padding, seconds
     )  # fmt: skip
     made = np.full((len(source.loop_vertex), 2), np.nan, np.float32)
-    made[working.loops] = layout.uv
-    return _everywhere(made, working), False, {"unwrap": layout.method, "gutter": layout.packing.gutter}
+    made[working.loops] = np.clip(layout.uv, 0, 1)
+    return _everywhere(made, working), {"unwrap": layout.method, "gutter": layout.packing.gutter}
+
+
+def _mended(uv: NDArray, working: Working, polygon: NDArray, path: Path) -> NDArray[np.float32]:
+    """UVs (F, 3, 2) in which all faces have texels. Raises: InputError."""
+    made = mended(working.vertices, working.triangles, polygon, uv)
+    if made is None:
+        remedy = "--uv keep lets them show a neighbour's texel, --uv new makes new ones"
+        raise InputError(f"{path}: its UVs leave no room for the faces that have none; {remedy}")
+    return made
+
+
+def _charts(source: Source, working: Working, uv: NDArray, problem: str | None) -> Kept:
+    """Charts of UVs (F, 3, 2), and what was found and done."""
+    if problem is not None:
+        return Kept(uv_charts(working.triangles, uv), False, [f"made new: {problem}"])
+    given = loop_uvs(source)[working.loops]
+    missing = ~np.asarray(np.isfinite(given).all((1, 2)))
+    new = ~flat(uv) & (missing | (given != uv).any((1, 2)))
+    area = face_normals(working.vertices, working.triangles)[1]
+    return keep(working.triangles, uv, area, missing, new)
 
 
 def _everywhere(uv: NDArray, working: Working) -> NDArray[np.float32]:
@@ -212,7 +244,7 @@ def _arrays(
         "vertices": working.vertices.astype(np.float32),
         "triangles": working.triangles,
         "normals": normals,
-        "uv": np.clip(uv, 0.0, 1.0),
+        "uv": uv,
         "charts": chart,
         "triangle_loops": working.loops,
         "to_world": working.to_world,

@@ -1,17 +1,13 @@
-"""UVs: the source's per loop, whether they can be baked, and the charts they form. v is up, [0, 1] the unit square."""
+"""UVs: the source's per loop, the texels that they cover, and the charts they form. v is up, [0, 1] the unit square."""
 
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.core.tiles import signed_area
 from stages.prep.source import Source
 from stages.prep.topology import face_components
 
-OVERLAP = 1e-3
-"""Largest share of covered texels that more than one face may claim."""
-
-_EDGE = 1e-5  # how far outside the unit square a kept UV may lie: 1/50 texel at 2048
 _RASTER = 2048  # texels across, for measuring overlap
-_NEGLIGIBLE = 1e-6  # share of the surface that may have UVs without area: slivers, not a missing layout
 
 
 def loop_uvs(source: Source) -> NDArray[np.float32]:
@@ -24,34 +20,6 @@ def loop_uvs(source: Source) -> NDArray[np.float32]:
         uv[:, 1] = (1.0 - uv[:, 1].astype(np.float64)).astype(np.float32)
     uv[source.loop_uv < 0] = np.nan
     return uv
-
-
-def unusable(uv: NDArray, area: NDArray) -> str | None:
-    """Why the UVs cannot be baked, or None.
-
-    Args:
-        uv: (F, 3, 2), NaN where missing. area: (F,) of the faces in space.
-    """
-    if np.isnan(uv).all():
-        return "none in the file"
-    bad = ~np.isfinite(uv).all((1, 2))
-    if bad.any():
-        return f"{int(bad.sum())} of {len(uv)} faces have none"
-    outside = ((uv < -_EDGE) | (uv > 1 + _EDGE)).any((1, 2))
-    if outside.any():
-        return f"{int(outside.sum())} of {len(uv)} faces lie outside the unit square"
-    flat = signed_area(uv) == 0
-    if area[flat].sum() > _NEGLIGIBLE * area.sum():
-        return f"{int(flat.sum())} of {len(uv)} faces have no area in UV"
-    share = overlap(uv)
-    return f"{100 * share:.3g} % of the covered texels overlap" if share >= OVERLAP else None
-
-
-def signed_area(uv: NDArray) -> NDArray[np.float64]:
-    """(F,) areas in UV, positive when counter-clockwise with v up."""
-    a, b, c = (uv[:, k].astype(np.float64) for k in range(3))
-    u, v = b - a, c - a
-    return (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
 
 
 def stretch(corners: NDArray, uv: NDArray) -> float:
@@ -73,9 +41,14 @@ def stretch(corners: NDArray, uv: NDArray) -> float:
 
 def overlap(uv: NDArray) -> float:
     """Share of covered texels that more than one face covers; 1 when no texel is covered at all."""
-    cover = coverage(uv.astype(np.float64) * _RASTER, _RASTER, _RASTER)
-    covered = int((cover > 0).sum())
-    return float((cover > 1).sum()) / covered if covered else 1.0
+    cover = covered(uv)
+    once = int((cover > 0).sum())
+    return float((cover > 1).sum()) / once if once else 1.0
+
+
+def covered(uv: NDArray) -> NDArray[np.int32]:
+    """How many triangles (F, 3, 2) cover the centre of each texel of the unit square."""
+    return coverage(uv.astype(np.float64) * _RASTER, _RASTER, _RASTER)
 
 
 def coverage(points: NDArray, height: int, width: int) -> NDArray[np.int32]:

@@ -32,6 +32,7 @@ class Example:
     parts: list[dict[str, Any]]
     source_format: str = "ply"
     uv_kept: bool = False
+    shared_texels: bool = False
     to_world: NDArray = field(default_factory=lambda: Y_UP_TO_WORLD)
     loop_normal: NDArray | None = None
     group: list[int] | None = None
@@ -117,6 +118,7 @@ def save_prep(path: Path, example: Example) -> Path:
         "source_format": example.source_format,
         "source_name": f"thing.{example.source_format}",
         "uv_kept": example.uv_kept,
+        "shared_texels": example.shared_texels,
         "parts": example.parts,
         "groups": list(example.groups),
         "passed_on": nothing_passed_on(),

@@ -310,8 +310,8 @@ def test_a_second_uv_set_is_baked_where_the_first_cannot_be(tmp_path: Path) -> N
 def test_two_bad_uv_sets_are_replaced(tmp_path: Path) -> None:
     path = two_sets(tmp_path, SQUARE[:, :2] * 8, SQUARE[:, :2] * 0)
     found = prep(path, tmp_path / "a.npz", PrepOptions(unwrap_triangles=0)).findings
-    assert found["uv_set"] is None and "outside the unit square" in found["unusable_uv"]
-    with pytest.raises(InputError, match="outside the unit square"):
+    assert found["uv_set"] is None and "go through 64 tiles" in found["unusable_uv"]
+    with pytest.raises(InputError, match="go through 64 tiles"):
         prep(path, tmp_path / "b.npz", PrepOptions(uv="keep"))
 
 

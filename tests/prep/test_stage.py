@@ -142,10 +142,19 @@ def test_good_uvs_are_kept_bit_for_bit(tmp_path: Path) -> None:
     check_promises(made)
 
 
-@pytest.mark.parametrize("scale, shift", [(16.0, 0.0), (1.0, 0.5), (0.0, 0.0)])
-def test_uv_traps_are_replaced_or_refused(tmp_path: Path, scale: float, shift: float) -> None:
-    """Tiled, out of the square, and all in one point: new ones, and the reason; refused where they must be kept."""
-    mesh = loose_cube(tmp_path / "a.obj", unfolded() * scale + shift)
+def test_uvs_across_the_border_of_a_tile_are_kept_bit_for_bit(tmp_path: Path) -> None:
+    uv = (unfolded() + (0.5, 2.5)).astype(np.float32)
+    made = prepared(loose_cube(tmp_path / "a.obj", uv.astype(np.float64)))
+    assert made.provenance.extra["uv_kept"] and not made.provenance.extra["shared_texels"]
+    assert made.provenance.extra["findings"]["uv"] == "kept; 12 of 12 faces outside the unit square, whose textures repeat"
+    assert np.array_equal(made["loop_uv"], uv)
+    assert np.array_equal(made["source_uv"][made["loop_source_uv"]], uv)
+
+
+@pytest.mark.parametrize("scale", [16.0, 0.0])
+def test_uv_traps_are_replaced_or_refused(tmp_path: Path, scale: float) -> None:
+    """Tiled, and all in one point: new ones, and the reason; refused where they must be kept."""
+    mesh = loose_cube(tmp_path / "a.obj", unfolded() * scale)
     made = prepared(mesh)
     assert not made.provenance.extra["uv_kept"] and made.provenance.extra["findings"]["unusable_uv"]
     check_promises(made)

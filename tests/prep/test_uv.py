@@ -1,4 +1,4 @@
-"""Whether UVs can be baked, told without being misled by shared edges."""
+"""The texels that UVs cover, told without being misled by shared edges."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from stages.prep.read_gltf import read_gltf
 from stages.prep.read_obj import read_obj
-from stages.prep.uv import coverage, loop_uvs, overlap, unusable, uv_charts
+from stages.prep.uv import coverage, loop_uvs, overlap, uv_charts
 from tests.prep.shapes import GltfBuilder, write_obj
 
 
@@ -47,28 +47,6 @@ def test_overlap_is_measured() -> None:
     assert overlap(apart) == 0
     assert overlap(np.concatenate([grid(4, 0, 0.4), grid(3, 0.2, 0.6)])) == pytest.approx(0.04 / 0.28, rel=0.01)
     assert overlap(np.full((1, 3, 2), 0.5)) == 1
-
-
-def told(uv: NDArray) -> str | None:
-    return unusable(uv.astype(np.float32), np.ones(len(uv)))
-
-
-def test_what_makes_uvs_unusable() -> None:
-    good = grid(4, 0, 0.4)
-    assert told(good) is None
-    assert told(np.full((2, 3, 2), np.nan)) == "none in the file"
-    some = np.where(np.arange(len(good))[:, None, None] == 3, np.nan, good)
-    assert told(some) == "1 of 32 faces have none"
-    assert "outside the unit square" in (told(good * 4) or "")
-    assert "no area" in (told(np.concatenate([good, np.full((1, 3, 2), 0.9)])) or "")
-    assert "overlap" in (told(np.concatenate([good, good[:, ::-1]])) or "")
-
-
-def test_a_sliver_without_uv_area_does_not_condemn_a_layout() -> None:
-    uv = np.concatenate([grid(4, 0, 0.4), np.full((1, 3, 2), 0.9)]).astype(np.float32)
-    area = np.ones(33)
-    area[-1] = 1e-9
-    assert unusable(uv, area) is None
 
 
 def test_v_up_keeps_its_bits_and_v_down_is_turned(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ layout(location = 0) in vec3 position;  // 0 to 1 in the box
 layout(location = 1) in vec2 octahedral;
 layout(location = 2) in vec2 texcoord;
 uniform mat4 projection;
-uniform vec3 origin;
+uniform vec3 origin, uvBox;             // of UVs: least u and v, extent
 uniform float extent;
 out vec3 p;
 out vec3 normal;
@@ -18,7 +18,7 @@ void main() {
   vec3 n = vec3(octahedral, 1.0 - abs(octahedral.x) - abs(octahedral.y));
   if (n.z < 0.0) n.xy = (1.0 - abs(n.yx)) * vec2(n.x < 0.0 ? -1.0 : 1.0, n.y < 0.0 ? -1.0 : 1.0);
   normal = n;
-  uv = texcoord;
+  uv = uvBox.xy + uvBox.z * texcoord;
   gl_Position = projection * vec4(p, 1.0);
 }`;
 
@@ -224,8 +224,7 @@ function picture(gl, image, srgb, anisotropy) {
   else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array([255, 255, 255, 255]));
   gl.generateMipmap(gl.TEXTURE_2D);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE);
-  gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE);
+  for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, data.mesh.repeats ? gl.REPEAT : gl.CLAMP_TO_EDGE);
   if (anisotropy) gl.texParameterf(gl.TEXTURE_2D, anisotropy.TEXTURE_MAX_ANISOTROPY_EXT, 8);
   return texture;
 }
@@ -305,6 +304,7 @@ async function start() {
   function place(at) {
     gl.uniform3fv(at.origin, data.mesh.origin);
     gl.uniform1f(at.extent, data.mesh.extent);
+    gl.uniform3fv(at.uvBox, data.mesh.uv_box);
   }
 
   function drawShadow(sun) {

@@ -89,7 +89,7 @@ class PriorGuidance:
         lights = images.paint(light_maps(sample.transport).float().flatten(1))
         exposure = self._prior.exposure(lights, mask)
         depth, normal = images.paint(images.surface.depth[:, None]), images.paint(images.surface.view_normals)
-        height = images.paint(sample.points[:, 2:])
+        height = images.paint(images.surface.points[:, 2:])
         return exposure, self._prior.prepare(depth, normal, height, mask, exposure * lights)
 
     def _text(self, images: Images, branches: int) -> TextEmbedding:
