@@ -68,7 +68,8 @@ def coated(coat: Coat, surface: Surface, world: Place, pieces: Pieces, number: i
         _solid(coat, surface, world, pieces, number) * metres, world.uv * metres, world.face, world.footprint * metres,
         (world.period[0] * coat.metres, world.period[1] * coat.metres, 0.0), world.seed * 31 + number,
     )  # fmt: skip
-    found = turned(LOOKS[coat.look](place), coat)
+    found = LOOKS[coat.look](place)
+    found = turned(found._replace(color=found.color * steadying(coat.look, place.footprint)), coat)
     columns = [*found.color, found.roughness, found.metallic, found.height / metres * np.float32(coat.relief)]
     return np.stack([np.broadcast_to(c, len(world)) for c in columns], 1).astype(np.float32)
 
@@ -98,6 +99,32 @@ def _grain_frame(grain: Array) -> Array:
     return np.stack([first, grain, np.cross(first, grain)]).astype(np.float32)
 
 
+FOOTPRINTS = tuple(2.0**k for k in range(-13, -5))
+"""At which a look's mean is told, shares of its `METRES`; the first is the truth."""
+
+
+def steadying(look: str, footprint: Array) -> Array:
+    """By what a look's colours are multiplied so that their mean is the same at every footprint: what is too fine to be seen
+    leaves it a little darker or lighter where colours are not linear in it. Args: (P,) metres. Returns: (3, P)."""
+    octave = np.log2(footprint / np.float32(METRES[look]))
+    return np.stack([np.interp(octave, np.log2(FOOTPRINTS), gain) for gain in _gains(look)]).astype(np.float32)
+
+
+@cache
+def _gains(look: str) -> Array:
+    """Mean at the finest footprint over that at each of `FOOTPRINTS`, (3, K)."""
+    found = np.stack([_sampled(look, METRES[look] * share, 64).color.mean(1) for share in FOOTPRINTS], 1)
+    return np.clip(found[:, :1] / np.maximum(found, 1e-6), 0.7, 1.4)
+
+
+def _sampled(look: str, footprint: float, count: int) -> Look:
+    """A look at count x count points of a square of the size at which it is legible. Args: footprint: metres."""
+    across = (np.arange(count, dtype=np.float32) + 0.5) * np.float32(METRES[look] / count)
+    u, v = (a.ravel() for a in np.meshgrid(across, across))
+    size = np.full(len(u), footprint, np.float32)
+    return LOOKS[look](Place(np.stack([u, v, 0 * u]), np.stack([u, v]), np.zeros(len(u), np.int32), size))
+
+
 class Means(NamedTuple):
     """Of a look: OKLab of its dyed share, (3,); roughness; metallic."""
 
@@ -109,11 +136,8 @@ class Means(NamedTuple):
 @cache
 def means(look: str) -> Means:
     """A look's means over a square of the size at which it is legible."""
-    across = (np.arange(SAMPLES, dtype=np.float32) + 0.5) * np.float32(METRES[look] / SAMPLES)
-    u, v = (a.ravel() for a in np.meshgrid(across, across))
-    step = np.full(len(u), METRES[look] / 512, np.float32)
-    found = LOOKS[look](Place(np.stack([u, v, 0 * u]), np.stack([u, v]), np.zeros(len(u), np.int32), step))
-    dye = np.broadcast_to(np.asarray(found.dye, np.float64), len(u)) + 1e-6
+    found = _sampled(look, METRES[look] / 512, SAMPLES)
+    dye = np.broadcast_to(np.asarray(found.dye, np.float64), SAMPLES**2) + 1e-6
     color = (found.color * dye).sum(1) / dye.sum()
     lab = to_oklab(color[:, None])[:, 0]
     return Means(lab.astype(np.float32), float(np.mean(found.roughness)), float(np.mean(found.metallic)))

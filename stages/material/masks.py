@@ -53,10 +53,11 @@ def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
     if mask.kind in CHANCE:
         return exceeds(value, level, 0.06, lost(at, _chance(mask)))
     rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.9, patch=0.4)
-    amount = np.float32(0.04 + 0.16 * mask.wear)
+    amount: Array = np.full(len(at), 0.2 * mask.wear, np.float32)
     if mask.kind in LEAST:  # where there is neither edge nor crease, noise makes none
         amount = amount * np.clip(value / np.float32(max(level, LEAST[mask.kind])), 0.25, 1)
-    return exceeds(value + amount * fbm(at, rough, 5), level, 0.02, amount * lost(at, rough))
+    worn = value + amount * fbm(at, rough, 5) if mask.wear else value
+    return exceeds(worn, level, 0.004 + 0.016 * mask.wear, amount * lost(at, rough))
 
 
 def _chance(mask: Mask) -> Spectrum:

@@ -40,7 +40,8 @@ def test_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         told = {row["substance"]: row for row in csv.DictReader(stream)}
     assert set(told) == {"granite", "rust"} and told["granite"]["own"] == "nan" and float(told["rust"]["own"]) > 0
     assert read_image(tmp_path / "out" / "whole.png").shape[:2] == (materials.CELL, materials.CELL * materials.COLUMNS)
-    assert len(materials.summary(rows)) == 3
+    assert all(0 < float(row["flicker"]) < 0.02 for row in told.values())
+    assert len(materials.summary(rows)) == 4
 
 
 def test_a_folder_without_sets_is_named(tmp_path: Path) -> None:

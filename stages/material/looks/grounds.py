@@ -71,19 +71,20 @@ def soil(at: Place) -> Look:
     flat = at.flat
     lump = fbm(at, Spectrum(0.10, 0.002, 0.85, tails=0.2, patch=0.5), 1)
     grit = fbm(at, Spectrum(0.004, 0.0004, 1.1, tails=0.5, skew=-0.15, patch=0.5), 2)
-    color, height = palette(0.42 + 0.14 * lump, "#2f241a", "#443426", "#5a4735", "#6f5a45"), 4e-3 * lump + 2e-4 * grit
+    color, height = palette(0.42 + 0.14 * lump, "#34281d", "#433326", "#534130", "#624f3c"), 4e-3 * lump + 2e-4 * grit
     for k, (size, share) in enumerate(((0.005, 0.7), (0.012, 0.5), (0.026, 0.3))):
         crumb = pebbles(warped(at, 0.07 * size, 0.5 * size, 3 + k, 3), size, 0.1 * size, 0.75, 6 + k, 1.0)
         here = crumb.cover * ((crumb.cells.random(1) < share) * crumb.shown + share * (1 - crumb.shown))
-        tone = each(crumb.cells.random(2), crumb.shown, "#3a2c20", "#4d3b2b", "#624c39", "#4a3828", "#735c46")
+        tone = each(crumb.cells.random(2), crumb.shown, "#3d2f23", "#4a3929", "#574332", "#46362a", "#634f3c")
         color = mix(color, shade(tone, 0.6 * (np.minimum(crumb.dome, 0.8) - 0.6)), here)
         height = mix(height, 0.3 * height + 0.3 * size * crumb.dome, here)
     stone = spots(warped(at, 0.0012, 0.008, 9), 0.034, (0.0015, 0.008), 0.7, 10)
-    color = mix(color, each(stone.cells.random(3), 1.0, "#8d8375", "#a69a89", "#756c61"), 0.85 * stone.cover)
-    root = marks(at, 0.07, 0.0016, 3, 0.0, 2 * np.pi, 11, 0.7, 0.6)
-    color = mix(color, palette(root.random(1), "#6b5237", "#9c7e55", "#b79b6d"), 0.85 * root.cover)
+    color = mix(color, each(stone.cells.random(3), 1.0, "#7d7367", "#968a7a", "#6a6157"), 0.85 * stone.cover)
+    root = marks(at, 0.09, 0.0011, 2, 0.0, 2 * np.pi, 11, 0.7, 0.6)
+    grown = root.cover * (root.random(2) < 0.35)
+    color = mix(color, palette(root.random(1), "#5c4630", "#84694a", "#a48a60"), 0.7 * grown)
     color = tint(shade(color, 0.16 * grit + 0.08 * lump), 0.06 * noise(flat, 0.05, 12))
-    height = height + 1.5e-3 * stone.cover + 7e-4 * root.cover - 2e-3
+    height = height + 1.5e-3 * stone.cover + 5e-4 * grown - 2e-3
     return Look(color, np.clip(0.92 + 0.04 * grit - 0.1 * stone.cover + 0.02 * lump, 0, 1), 0.0, height)
 
 
@@ -209,13 +210,14 @@ def snow(at: Place) -> Look:
     crystal = cells(at, 0.0016, 5)
     spark = (crystal.random(1) < 0.02) * (crystal.near < 0.0005) * fading(0.0016, at.footprint)
     hollow = np.clip(-0.5 * drift - 0.25 * crust, -1, 1)
-    color = palette(0.55 - 0.18 * hollow + 0.06 * crust, "#cdd6e0", "#dde3e9", "#e8ebee", "#f1f2f3")
-    color = shade(color, 0.045 * grain + 0.012 * crust + 0.08 * spark)
+    trodden = masked(warped(at, 0.01, 0.06, 6, 3), Spectrum(0.11, 0.002, 0.62, (1, 1.6, 1), 0.3, patch=0.5), 0.03, 7, 0.5)
+    color = palette(0.60 - 0.30 * hollow + 0.06 * crust, "#c3cfdd", "#d9e0e8", "#e8ebee", "#f3f4f4")
+    color = shade(color, 0.045 * grain + 0.02 * crust + 0.08 * spark - 0.10 * trodden)
     return Look(
         color,
         np.clip(0.72 + 0.06 * grain + 0.04 * crust - 0.5 * spark, 0.1, 1),
         0.0,
-        0.014 * drift + 4.5e-4 * crust + 1.5e-4 * grain,
+        0.014 * drift + 1.8e-4 * crust + 8e-5 * grain - 0.002 * trodden,
     )
 
 
@@ -223,7 +225,7 @@ def ice(at: Place) -> Look:
     """A frozen lake: dark clear ice, white fractures that stand on edge as hazy sheets, bubbles, scratches, frost."""
     bent = warped(at, 0.006, 0.15, 1, 3)
     plane = cells(bent, 0.22, 2)
-    main, fine = cracks(bent, 0.22, 0.0022, 0.75, 3, 1, 0.02), cracks(bent, 0.09, 0.0012, 0.4, 4, 2, 0.03)
+    main, fine = cracks(bent, 0.24, 0.0024, 0.6, 3, 1, 0.03), cracks(bent, 0.1, 0.0010, 0.05, 4, 2, 0.04)
     cloud = fbm(bent, Spectrum(0.2, 0.002, 0.8, patch=0.6), 5)
     side = 0.02 + 0.05 * plane.random(1) * (plane.random(2) < 0.55)  # the sheet leans under this piece, or away from it
     sheet = np.exp(-main.near / side) * np.clip(0.45 + 0.35 * cloud, 0, 1) * np.clip(0.5 + 0.6 * noise(at, 0.15, 6), 0, 1)
@@ -233,10 +235,10 @@ def ice(at: Place) -> Look:
     bubble = np.clip((large.cover * (0.35 + 0.65 * ring) + small.cover) * swarm, 0, 1)
     frost = fbm(at, Spectrum(0.01, 0.0006, 1.0, tails=0.4, skew=0.2, patch=0.6), 10)
     scratch = marks(at, 0.25, 0.0009, 3, 0.5, 2 * np.pi, 11, 0.6, 0.15).cover
-    white = np.clip(main.cover + 0.75 * fine.cover + 0.75 * sheet + 0.6 * bubble + 0.3 * scratch, 0, 1)
+    white = np.clip(main.cover + 0.75 * fine.cover + 0.55 * sheet + 0.5 * bubble + 0.15 * scratch, 0, 1)
     color = palette(0.42 + 0.14 * cloud + 0.3 * (plane.random(3) - 0.5), "#1d3a44", "#2c5058", "#41696f", "#5e868a")
     color = mix(color, palette(0.6 + 0.15 * frost, "#a9c3c8", "#d3e1e3", "#edf3f3"), white)
-    color = tint(shade(color, 0.06 * frost), 0.05 * noise(bent, 0.1, 12))
+    color = tint(shade(color, 0.035 * frost), 0.05 * noise(bent, 0.1, 12))
     return Look(
         color,
         np.clip(0.10 + 0.05 * frost + 0.25 * white + 0.2 * scratch, 0.03, 1),
@@ -246,29 +248,29 @@ def ice(at: Place) -> Look:
 
 
 def ash(at: Place) -> Look:
-    """A cold hearth: grey powder, white flakes that keep the shape of what burnt, crumbs of charcoal."""
+    """A cold hearth: pale powder in drifts, curled white flakes that keep the grain of what burnt, crumbs of charcoal."""
     flat = at.flat
-    lump = fbm(warped(at, 0.003, 0.04, 1), Spectrum(0.08, 0.0015, 0.85, tails=0.2, patch=0.4), 2)
-    grit = fbm(at, Spectrum(0.004, 0.0002, 1.15, tails=0.5, skew=-0.2, patch=0.5), 3)
-    color, height = palette(0.5 + 0.12 * lump, "#8a8783", "#a3a09b", "#b9b6b0", "#cdcac4"), 1.2e-3 * lump + 2.5e-4 * grit
-    bent = warped(flat, 0.0009, 0.006, 8, 2)
-    flake = marks(
-        Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.02, 0.007, 4, 0.0, 2 * np.pi, 4, 0.85, 0.2
-    )
-    plate = flake.cover * (flake.random(1) < 0.35)
-    color = mix(
-        color,
-        shade(palette(flake.random(2), "#b5b2ad", "#d2cfca", "#e2e0db"), -0.15 * np.clip(flake.across, -1, 1)),
-        0.85 * plate,
-    )
-    coal = pebbles(warped(at, 0.0005, 0.008, 5, 3), 0.010, 0.0006, 0.15, 6, 1.0, (0.8, 1.4, 1))
-    char = coal.cover * ((coal.cells.random(1) < 0.09) * coal.shown + 0.09 * (1 - coal.shown))
-    facet = (coal.cells.random(2) - 0.5) + 8 * coal.cells.offset[0] * (coal.cells.random(3) - 0.5)
-    color = mix(
-        shade(color, 0.15 * grit), shade(palette(0.5 + 0.4 * facet, "#282726", "#353332", "#4a4745"), 0.15 * grit), 0.92 * char
-    )
-    height = height + 8e-4 * plate + 0.004 * char * coal.dome - 6e-4
-    return Look(tint(color, 0.04 * noise(at, 0.03, 7)), np.clip(0.95 + 0.03 * grit - 0.2 * char, 0, 1), 0.0, height)
+    bent = warped(at, 0.003, 0.03, 1, 4)
+    drift = fbm(bent, Spectrum(0.09, 0.0012, 0.8, tails=0.2, patch=0.4), 2)
+    grit = fbm(at, Spectrum(0.003, 0.0002, 1.08, tails=0.5, skew=-0.2, patch=0.5), 3)
+    color, height = palette(0.5 + 0.15 * drift, "#77736f", "#918d88", "#a8a49f", "#c0bdb8"), 7e-4 * drift + 7e-5 * grit
+    ragged = warped(flat, 0.0011, 0.004, 8, 3)
+    lain = Place(ragged.p, ragged.p[:2], at.face, at.footprint, at.period, at.seed)
+    for k in range(2):
+        flake = marks(lain, 0.026, 0.008, 5, 1.3 * k, 2 * np.pi, 4 + k, 0.8, 0.25)
+        here = flake.cover * (flake.random(1) < 0.4)
+        side = np.clip(np.where(here > 0, flake.across, 0), -1, 1)
+        grain = np.sin(14 * side + 6 * flake.random(3) + 1.5 * grit) * fading(0.002, at.footprint)
+        tone = palette(0.5 + 0.9 * (flake.random(2) - 0.5) + 0.1 * grain, "#8f8b87", "#bab6b1", "#d6d3ce", "#e6e4e0")
+        color = mix(shade(color, -0.25 * here * (abs(side) > 0.9)), shade(tone, 0.07 * grain - 0.2 * side), 0.8 * here)
+        height = mix(height, height + 5e-4 + 4e-4 * side, here)
+    coal = spots(warped(at, 0.0012, 0.004, 5, 3), 0.012, (0.0004, 0.0030), 0.45, 6, (0.8, 1.5, 1))
+    char = coal.cover
+    color = mix(shade(color, 0.11 * grit), palette(0.5 + 0.25 * grit, "#232221", "#33312f", "#4a4744"), 0.9 * char)
+    dust = masked(at, Spectrum(0.012, 0.0004, 0.9), 0.2, 9, 0.4)
+    color = mix(color, palette(0.5 + 0.2 * grit, "#a5a19c", "#bdbab5"), 0.5 * dust)
+    rough = np.clip(0.95 + 0.03 * grit - 0.2 * char, 0, 1)
+    return Look(tint(color, 0.04 * noise(at, 0.03, 7)), rough, 0.0, height + 1e-3 * char - 6e-4)
 
 
 def charcoal(at: Place) -> Look:

@@ -61,7 +61,7 @@ def worked(at: Place, kind: Metal, roughness: float, height: Array | float, fine
     dull = np.clip(kind.dull * (0.5 + 0.45 * handled + 0.9 * spotted), 0, 1)
     color = palette(0.5 + 0.22 * fine + 0.12 * handled, *kind.colors)
     color = mix(color, palette(0.5 + 0.3 * fine, *kind.tarnish), 0.3 * dull)
-    color = tint(shade(color, 0.03 * fine - 0.12 * dull + 0.1 * scored), 0.04 * noise(at, 0.04, 45))
+    color = tint(shade(color, 0.03 * fine - 0.12 * dull + 0.1 * scored), 0.015 * noise(at, 0.04, 45))
     rough = roughness * (1 + 0.10 * fine + 0.18 * handled) + 0.22 * dull + 0.1 * scored
     return Look(color, np.clip(rough, 0.02, 1), 1.0 - 0.25 * np.clip(dull - 0.5, 0, 1), height - 4e-6 * scored)
 
@@ -107,14 +107,15 @@ def cast(at: Place, kind: Metal) -> Look:
 
 
 def hammered(at: Place, kind: Metal) -> Look:
-    """Round facets from the hammer, each a shallow bowl that meets its neighbours in soft ridges."""
-    blow = cells(warped(at, 0.002, 0.02, 1), 0.017, 2, 0.7)
-    deep = 0.7 + 0.6 * blow.random(1)
-    bowl = deep * np.clip(blow.near / blow.size, 0, 1) ** 2
-    ridge = np.exp(-((blow.border / 0.0012) ** 2))
+    """Round dents from the hammer, each a shallow bowl that cuts into those before it, soft ridges where they meet."""
+    bent = warped(at, 0.0006, 0.02, 1)
+    dent, late = cells(bent, 0.016, 2, 0.75, (1, 1, 4)), cells(bent, 0.021, 4, 0.8, (1, 1, 4))
+    shown = fading(0.012, at.footprint)
+    bowls = [(0.75 + 0.5 * blow.random(1)) * (blow.near / blow.size) ** 2 for blow in (dent, late)]
+    bowl = (np.minimum(bowls[0], bowls[1] + 0.06 + 0.16 * late.random(3)) - 0.20) * shown
     fine = fbm(at, Spectrum(0.003, 0.0003, 1.1, tails=0.4, patch=0.3), 3)
-    look = worked(at, kind, 0.24, 9e-4 * bowl - 2e-4 * ridge, 0.6 * fine + 0.8 * (bowl - 0.3))
-    return look._replace(color=shade(look.color, 0.25 * (bowl - 0.28) - 0.06 * ridge + 0.25 * (blow.random(2) - 0.5)))
+    look = worked(at, kind, 0.22, 1.5e-3 * bowl, 0.5 * fine + 1.5 * bowl)
+    return look._replace(color=shade(look.color, 0.35 * bowl + 0.05 * (dent.random(2) - 0.5) * shown))
 
 
 def machined(at: Place, kind: Metal) -> Look:
@@ -159,6 +160,8 @@ def foil(at: Place, kind: Metal) -> Look:
                 0.03 * tilt + 0.03 * tilt_small - 1e-5 * np.clip(crease, 0, 1))  # fmt: skip
 
 
+CAST_IRON = METALS["iron"]._replace(colors=("#58595c", "#6c6d70", "#818284"), tarnish=("#33302e", "#4b443e"), dull=0.55)
+
 FINISHES: dict[str, Callable[..., Look]] = {
     "": rolled, "brushed": brushed, "polished": polished, "cast": cast, "hammered": hammered, "machined": machined,
 }  # fmt: skip
@@ -166,6 +169,9 @@ FINISHES: dict[str, Callable[..., Look]] = {
 LOOKS: dict[str, Substance] = {
     f"{finish} {metal}".strip(): partial(make, kind=kind) for metal, kind in METALS.items() for finish, make in FINISHES.items()
 }
-LOOKS |= {"galvanised steel": galvanised, "gold leaf": partial(foil, kind=METALS["gold"]),
-          "foil": partial(foil, kind=METALS["aluminium"]), "chrome": partial(polished, kind=METALS["steel"])}  # fmt: skip
+LOOKS |= {
+    "cast iron": partial(cast, kind=CAST_IRON), "galvanised steel": galvanised,
+    "chrome": partial(polished, kind=METALS["steel"]),
+    "gold leaf": partial(foil, kind=METALS["gold"]), "foil": partial(foil, kind=METALS["aluminium"]),
+}  # fmt: skip
 METRES = dict.fromkeys(LOOKS, 0.35)

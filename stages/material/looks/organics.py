@@ -39,7 +39,7 @@ def skin(at: Place) -> Look:
     color = tint(color, 0.05 * blood + 0.02 * noise(at, 0.012, 11), -0.02 * blood)
     color = mix(color, palette(0 * fine, "#8f5f45"), 0.45 * freckle)
     color = shade(color, 0.03 * fine - 0.22 * wide_net.cover - 0.35 * pore)
-    height = 3e-5 * bump + 3e-6 * fine - 1.5e-5 * wide_net.cover - 4e-5 * pore + 4e-5 * blood
+    height = 1.4e-5 * bump + 2e-6 * fine - 6e-6 * wide_net.cover - 2.5e-5 * pore + 1e-5 * blood
     return Look(color, np.clip(0.46 - 0.1 * bump + 0.05 * fine + 0.12 * wide_net.cover + 0.04 * blood, 0, 1), 0.0, height)
 
 
@@ -66,17 +66,17 @@ def bone(at: Place) -> Look:
 def horn(at: Place) -> Look:
     """Cow horn: amber to black in streaks along it, growth rings across, scraped, polished in places."""
     flat = at.flat
-    bent = warped(flat, 0.004, 0.06, 1, 2)
+    bent = warped(flat, 0.0015, 0.06, 1, 2)
     streak = fbm(bent, Spectrum(0.03, 0.0012, 0.85, (1, 9, 1), 0.2, -0.1, 0.4), 2)
     cloud = fbm(bent, Spectrum(0.12, 0.02, 0.7, (1, 2.5, 1)), 3)
     fibre = fbm(flat, Spectrum(0.0024, 0.0002, 1.0, (1, 18, 1), 0.4, -0.1, 0.4), 4)
     ring = fbm(bent, Spectrum(0.02, 0.0025, 0.75, (12, 1, 1), 0.2), 5)
     scratch = marks(at, 0.03, 0.0003, 4, 1.5, 0.9, 6, 0.7, 0.1).cover
-    t = 0.48 + 0.16 * streak + 0.22 * cloud + 0.06 * ring + 0.06 * fibre
+    t = 0.46 + 0.13 * streak + 0.20 * cloud + 0.025 * ring + 0.06 * fibre
     color = palette(t, "#241a14", "#4a3524", "#856239", "#b9945f", "#d9c297")
     color = shade(color, 0.09 * fibre + 0.06 * ring + 0.12 * scratch)
-    rough = 0.32 + 0.05 * fibre + 0.05 * ring + 0.2 * scratch
-    return Look(color, np.clip(rough, 0.05, 1), 0.0, 3e-4 * ring + 2e-5 * fibre - 1e-5 * scratch)
+    rough = 0.22 + 0.05 * fibre + 0.03 * ring + 0.2 * scratch
+    return Look(color, np.clip(rough, 0.05, 1), 0.0, 5e-5 * ring + 8e-6 * fibre - 6e-6 * scratch)
 
 
 HAIRS = Spectrum(0.0014, 0.00012, 0.95, (1, 26, 1), 0.35, -0.1, 0.3)
@@ -154,7 +154,7 @@ def bread(at: Place) -> Look:
     fine = fbm(at, Spectrum(0.0016, 0.00012, 1.0, tails=0.3, skew=-0.1, patch=0.4), 3)
     wide = fbm(at, Spectrum(0.05, 0.004, 0.8), 4)
     color = palette(0.6 + 0.06 * wide + 0.08 * fine, "#e0c896", "#ecdab2", "#f3e6c8", "#f7eed8")
-    height = 4e-5 * fine + 3e-4 * wide
+    height = 1e-5 * fine + 3e-4 * wide
     for k, (size, radius, share) in enumerate(
         ((0.0013, 0.00062, 0.95), (0.0024, 0.0012, 0.9), (0.0050, 0.0025, 0.75), (0.0115, 0.0056, 0.6))
     ):
@@ -163,7 +163,7 @@ def bread(at: Place) -> Look:
         rim = np.exp(-((hole.inside / (0.16 * radius)) ** 2)) * fading(radius, at.footprint)
         floor = palette(0.95 - 1.0 * np.sqrt(deep) + 0.07 * fine, "#a9804a", "#c39c64", "#d8b982", "#e8d3a8")
         color = mix(shade(color, 0.05 * rim), floor, hole.cover * (0.4 + 0.13 * k))
-        height = height - hole.cover * (0.2 + 0.08 * k) * radius * deep * (2 - deep) + 0.03 * radius * rim
+        height = height - hole.cover * (0.08 + 0.05 * k) * radius * deep * (2 - deep) + 0.015 * radius * rim
     return Look(tint(shade(color, 0.05 * fine), 0.03 * wide), np.clip(0.82 + 0.04 * fine, 0, 1), 0.0, height + 5e-4)
 
 

@@ -53,7 +53,8 @@ CLOTHS = {
     "denim": Cloth(
         ("#11233f", "#19335a", "#2b4d7b", "#486c97"), ("#4d6080", "#74859e"), 0.0008, "twill 3/1", 0.95, 0.15, fade=0.14
     ),
-    "fabric": Cloth(("#9c9483", "#b4ab99", "#c4bcab"), ("#a59c8a", "#bbb2a1", "#cbc4b4"), 0.0007, slub=0.08, stray=0.15),
+    "fabric": Cloth(("#9c9483", "#b4ab99", "#c4bcab"), ("#a59c8a", "#bbb2a1", "#cbc4b4"), 0.0007, slub=0.035, stray=0.1,
+                    fuzz=0.05, fade=0.02),
     "canvas": Cloth(
         ("#ac9f82", "#c5b899", "#d8cdb2"), ("#b3a688", "#cabd9f", "#ddd3ba"), 0.0012, "basket", 0.94, 0.16, 0.3
     ),
@@ -245,7 +246,7 @@ def wool_knit(at: Place) -> Look:
 def felt(at: Place) -> Look:
     """Wool pressed without a thread: heathered grey of white, grey and black fibres that lie every way, soft clouds, fluff."""
     flat = at.flat
-    bent = warped(flat, 0.0012, 0.008, 1, 3)
+    bent = warped(flat, 0.0003, 0.004, 1, 3)
     cloud = fbm(bent, Spectrum(0.022, 0.0012, 0.8, patch=0.3), 2)
     fine = fbm(warped(flat, 0.0003, 0.0012, 3, 2), Spectrum(0.0012, 0.0001, 1.0, tails=0.4, patch=0.3), 4)
     color, height = palette(0.5 + 0.05 * cloud + 0.12 * fine, "#6f6e6b", "#84837f", "#989792"), 4e-5 * cloud + 5e-6 * fine
@@ -298,14 +299,24 @@ def carpet(at: Place) -> Look:
 
 
 def towel(at: Place) -> Look:
-    """Terry: rows of soft upright loops of white cotton, each bent its own way."""
+    """Terry: soft loops of white cotton yarn that stand in rows and flop every way, twisted, dark between."""
     flat = at.flat
-    color, rise, own, turn = pile(at, 0.0020, ("#d2d1cc", "#e2e1dc", "#ecebe6", "#dad9d3"), 1, 0.62)
-    fibre = fbm(warped(flat, 0.0004, 0.002, 7, 2), Spectrum(0.002, 0.00015, 1.0, (0.6, 1.4, 1), 0.4, -0.1, 0.4), 8)
+    fibre = fbm(warped(flat, 0.0003, 0.0016, 7, 2), Spectrum(0.0014, 0.00012, 1.0, tails=0.4, patch=0.3), 8)
     wide = fbm(flat, Spectrum(0.08, 0.003, 0.9, patch=0.4), 9)
-    color = tint(shade(color, 0.07 * fibre + 0.07 * turn + 0.03 * wide), 0.06 * own)
-    height = 6e-4 * rise + 2e-4 * own + 9e-5 * turn + 4e-5 * fibre + 2e-4 * wide
-    return Look(color, np.clip(0.94 + 0.03 * fibre - 0.06 * rise, 0, 1), 0.0, height)
+    color, height = palette(0.5 + 0.15 * fibre, "#a3a19b", "#b9b7b1", "#c9c7c1"), -4e-4 + 5e-5 * wide
+    for k in range(3):
+        loop = marks(at, 0.0042, 0.00085, 7, 1.2 + 0.9 * k, 4.4, 3 + k, 0.35, 0.8)
+        inside = abs(loop.across) < 2
+        side, seen = np.clip(np.where(inside, loop.across, 0), -1, 1), fading(0.0005, at.footprint)
+        back = (np.sqrt(1 - side * side) - 0.785) * seen * inside
+        ply = np.cos(2 * np.pi * (1.2 * side + 3.5 * loop.along)) * seen * inside
+        tone = each(loop.random(1), seen, "#d4d3ce", "#e6e5e1", "#efeeea", "#dddcd7")
+        tone = shade(tone, 0.30 * back + 0.05 * ply + 0.05 * fibre + 0.10 * (k - 1.6))
+        rim = np.exp(-((1 - abs(side)) / 0.16)) * seen * inside
+        color = mix(color, shade(tone, -0.22 * rim), loop.cover)
+        height = mix(height, -2e-4 + 2.6e-4 * k + 2.6e-4 * back + 2e-5 * ply + 1.2e-4 * (1 - loop.along**2), loop.cover)
+    color = tint(shade(color, 0.03 * wide), 0.02 * noise(flat, 0.02, 12))
+    return Look(color, np.clip(0.94 + 0.03 * fibre, 0, 1), 0.0, height)
 
 
 def corduroy(at: Place) -> Look:

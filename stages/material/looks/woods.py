@@ -104,10 +104,10 @@ def timber(at: Place, kind: Timber) -> Look:
     ring = years - np.floor(years)
     seen = fading(kind.ring, at.footprint)
     season = 0.31 + (ring**2 * threshold(1 - ring, 0.06, 0.06) - 0.31) * seen  # slow into latewood, sharp back into spring
-    fibre = fbm(at, Spectrum(0.003, 0.0002, 1.0, (1, 24, 1), tails=0.4, patch=0.4), 4)
+    fibre = fbm(at, Spectrum(0.003, 0.0002, 1.0, (1, 11, 1), tails=0.4, patch=0.4), 4)
     tone = fbm(at, Spectrum(0.15, 0.02, 0.7, (1, 5, 1)), 5)
     band = fbm(
-        at.moved(np.stack([0.3 * (radius - x), 0 * y, 0 * y])), Spectrum(0.03, 0.002, 0.8, (1, 30, 1), tails=0.2, patch=0.4), 9
+        at.moved(np.stack([0.3 * (radius - x), 0 * y, 0 * y])), Spectrum(0.03, 0.002, 0.8, (1, 20, 1), tails=0.2, patch=0.4), 9
     )
     vessels = cells(at, kind.pore * 2.2, 6, 1.0, (1, 16, 1))
     pore = line(
@@ -308,7 +308,7 @@ def cork(at: Place) -> Look:
     """Pressed cork: granules of several sizes, each of its own brown, dark skins and crumbs between."""
     grit = fbm(at, Spectrum(0.0016, 0.0002, 1.0, tails=0.5, skew=-0.2, patch=0.4), 1)
     color, height = palette(0.5 + 0.15 * grit, "#7d5733", "#94693f", "#a97c4e"), 2e-5 * grit
-    for k, (size, share) in enumerate(((0.0022, 0.85), (0.0042, 0.7), (0.0075, 0.45))):
+    for k, (size, share) in enumerate(((0.0012, 0.9), (0.0023, 0.75), (0.0042, 0.5))):
         grain = pebbles(warped(at, 0.09 * size, 0.6 * size, 2 + k, 3), size, 0.04 * size, 0.15, 5 + k, 1.0)
         here = grain.cover * ((grain.cells.random(1) < share) * grain.shown + share * (1 - grain.shown))
         tone = each(

@@ -1,0 +1,57 @@
+"""How much a view changes with the size of the textures that it is rendered with: band limits that work change nothing."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.core.color import srgb_encode
+from stages.material.directions import WHOLE
+from stages.material.evaluate import COLUMNS, coated
+from stages.material.place import Place
+from stages.material.recipe import Coat
+from stages.material.relief import gentle
+from stages.material.substances import METRES
+from stages.material.surface import Surface
+
+SIZES = 1024, 4096
+"""Texels along an edge of the two textures."""
+
+LIGHT = np.array([0.45, 0.35, 0.82]) / np.linalg.norm([0.45, 0.35, 0.82])
+"""Towards the light of the view: right, up, out."""
+
+
+def flicker(look: str, share: float = 1 / 8, supersample: int = 1, relief: float = 1.0) -> float:
+    """RMSE between two views of a substance's square, with textures of both `SIZES`; 1 is white.
+
+    A pixel of the view is as large as two texels of the smaller texture. Args: share: of the square's edge that is looked at.
+    supersample: samples along each edge of a texel of the smaller one, averaged as `bake` does. relief: 0 looks at the
+    colour alone.
+    """
+    small, large = (textures(look, size, share, s) for size, s in zip(SIZES, (supersample, 1), strict=True))
+    pixels = round(SIZES[0] * share) // 2
+    one, other = (view(maps, 1 / size, pixels, relief) for maps, size in zip((small, large), SIZES, strict=True))
+    return float(np.sqrt(np.square(one - other).mean()))
+
+
+def textures(look: str, size: int, share: float, supersample: int) -> NDArray[np.float32]:
+    """(N + 2, N + 2, 6) texels of a part of a square, see `COLUMNS`, and one beyond each side. size: along the whole edge."""
+    count = round(size * share) + 2
+    across = ((np.arange(count * supersample) + 0.5) / supersample - 1).astype(np.float32) / np.float32(size)
+    u, v = (a.ravel() for a in np.meshgrid(across, across))
+    point = np.stack([u, v, np.zeros_like(u)], 1)
+    normal = np.broadcast_to(np.array([0, 0, 1], np.float32), point.shape)
+    surface = Surface.bare(point, normal, 1 / (size * supersample))
+    world = Place(np.ascontiguousarray(point.T), np.stack([u, v]), np.zeros(len(u), np.int32), surface.footprint)
+    values = coated(Coat(look, metres=METRES[look]), surface, world, WHOLE, 0)
+    return values.reshape(count, supersample, count, supersample, COLUMNS).mean((1, 3))
+
+
+def view(maps: NDArray[np.float32], texel: float, pixels: int, relief: float) -> NDArray[np.float64]:
+    """Encoded picture (pixels, pixels, 3) of `textures` in the light of `LIGHT`. Args: texel: edge of one, squares."""
+    height = maps[..., 5].astype(np.float64) * relief / (2 * texel)
+    slope = np.stack([height[1:-1, 2:] - height[1:-1, :-2], height[2:, 1:-1] - height[:-2, 1:-1]], -1)
+    right, up = np.moveaxis(gentle(slope), -1, 0)
+    normal = np.stack([-right, -up, np.ones_like(right)], -1) / np.sqrt(right**2 + up**2 + 1)[..., None]
+    lit = np.clip(normal @ LIGHT, 0, 1) / LIGHT[2]
+    color = maps[1:-1, 1:-1, :3] * (0.4 + 0.6 * lit[..., None])
+    step = len(color) // pixels
+    return srgb_encode(color[: pixels * step, : pixels * step].reshape(pixels, step, pixels, step, 3).mean((1, 3)))
