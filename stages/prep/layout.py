@@ -29,6 +29,12 @@ ALIKE, SCALE = 0.9, 1.5
 SAMPLES = 4096
 """Points of the surface at which that is asked."""
 
+FAR, WIDE = 4096.0, 64.0
+"""Tiles away from the square beyond which float32 knows no texel, and tiles that one face may go through."""
+
+COPIES = 8.0
+"""Most tiles that a face may lie in, on average over the faces."""
+
 SHARED = 1e-3
 """Share of the covered texels that more than one place may claim without being told."""
 
@@ -43,12 +49,20 @@ class Kept:
     told: list[str]
 
 
+def sound(uv: NDArray[np.float32]) -> NDArray[np.float32]:
+    """UVs (F, 3, 2), NaN for faces that lack some, lie too far away or go through too many tiles."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        good = (np.abs(uv) <= FAR).all((1, 2)) & (np.ptp(uv, axis=1) <= WIDE).all(1)
+    return np.where(good[:, None, None], uv, np.float32(np.nan))
+
+
 def unusable(triangles: NDArray, uv: NDArray, area: NDArray) -> str | None:
     """Why UVs cannot be kept, or None.
 
     Args:
         triangles: (F, 3). uv: (F, 3, 2), NaN where missing. area: (F,) of the faces in space.
     """
+    uv = sound(uv)
     finite = np.isfinite(uv).all((1, 2))
     if not finite.any():
         return "none in the file"
@@ -56,6 +70,8 @@ def unusable(triangles: NDArray, uv: NDArray, area: NDArray) -> str | None:
     if area[textured].sum() < TEXTURED * area.sum():
         found = f"{int((~finite).sum())} of {len(uv)} faces have none and {int((finite & ~textured).sum())} no area"
         return f"{found}: {_percent(1 - area[textured].sum() / area.sum())} of the surface would have no texels"
+    if tiles(uv[finite])[1].prod(1).sum() > COPIES * len(uv) + 100_000:
+        return "faces go through many tiles: little of the texture would be a place's own"
     triangles, uv, area = triangles[textured], uv[textured], area[textured]
     often = _tiled(uv_charts(triangles, uv), uv, area)
     if often > OFTEN:

@@ -14,7 +14,7 @@ from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
 from stages.core.tiles import flat
 from stages.prep.gltf_file import companions
-from stages.prep.layout import Kept, keep, unusable, with_neighbours
+from stages.prep.layout import Kept, keep, sound, unusable, with_neighbours
 from stages.prep.measure import topology
 from stages.prep.mend import mended
 from stages.prep.normals import authored, face_normals, shading_normals
@@ -158,6 +158,7 @@ def _texture(
     polygon = np.searchsorted(source.loop_start, working.loops[:, 0], "right") - 1
     if problem is None:
         uv = loop_uvs(source)
+        uv[working.loops] = sound(uv[working.loops])
         if options.uv == "mend":
             uv[working.loops] = _mended(uv[working.loops], working, polygon, path)
         uv[working.loops] = with_neighbours(uv[working.loops], working.triangles, polygon)
@@ -184,7 +185,7 @@ def _charts(source: Source, working: Working, uv: NDArray, problem: str | None) 
     """Charts of UVs (F, 3, 2), and what was found and done."""
     if problem is not None:
         return Kept(uv_charts(working.triangles, uv), False, [f"made new: {problem}"])
-    given = loop_uvs(source)[working.loops]
+    given = sound(loop_uvs(source)[working.loops])
     missing = ~np.asarray(np.isfinite(given).all((1, 2)))
     new = ~flat(uv) & (missing | (given != uv).any((1, 2)))
     area = face_normals(working.vertices, working.triangles)[1]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.prep.layout import keep, unusable, with_neighbours
+from stages.prep.layout import keep, sound, unusable, with_neighbours
 from tests.prep.test_uv import grid
 
 GRID = grid(8, 0.1, 0.5).astype(np.float32)  # 128 faces
@@ -104,3 +104,17 @@ def test_polygons_without_uvs_take_one_texel_of_a_neighbour() -> None:
     one = uv.copy()
     one[1, 2] = np.nan
     assert np.array_equal(with_neighbours(one, triangles, polygon)[1], [uv[1, 0], uv[1, 1], uv[1, 0]])
+
+
+def test_a_face_at_the_end_of_the_world_is_one_without_uvs() -> None:
+    """No copies are made of it, however many tiles it goes through."""
+    triangles, uv = stacked(GRID, GRID[:2])
+    uv = uv.copy()
+    uv[-1, 0], uv[-2, 0] = (3e38, -3e38), (1e5, 1e5)
+    assert np.isnan(sound(uv)[-2:]).all()
+    assert np.array_equal(sound(uv)[:-2], GRID)
+    assert unusable(triangles, uv, np.ones(130)) is None
+    wide = GRID.copy()
+    wide[:, 0] += np.float32(40)
+    many = np.concatenate([np.tile(wide, (40, 1, 1)), GRID])
+    assert "faces go through" in (told(many, np.repeat([1e-12, 1], [5120, 128])) or "")
