@@ -14,6 +14,7 @@ from stages.core.errors import DreammatError
 COMMANDS = {
     "run": "Texture a mesh: the next four commands in one call.",
     "prep": "Read, check, mend and unwrap a mesh.",
+    "parts": "List the parts of a prepared mesh by name, and draw them.",
     "conditions": "Ray-trace geometry and light around the mesh.",
     "distill": "Optimise the material for a prompt.",
     "bake": "Write textures and a model with the material.",

@@ -18,3 +18,10 @@ class ExportOptions:
         """Raises: InputError that names the option, what was found and what is expected."""
         if self.target not in TARGETS:
             raise InputError(f"target: {self.target}; expected one of {', '.join(TARGETS)}")
+
+
+@dataclass(frozen=True)
+class PartsOptions:
+    """How the parts of a mesh are drawn."""
+
+    size: int = 640  # pixels along each edge of one picture
