@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.prep import charts, xatlas_worker
+from stages.prep.merge import merge
 from stages.prep.normals import face_normals
 from stages.prep.overlap import overlapping
 from stages.prep.pack import Packing, affordable_padding, pack
 from stages.prep.stitch import stitch
 from stages.prep.topology import face_components, renumber
-from stages.prep.uv import signed_area, uv_vertices
+from stages.prep.uv import signed_area, stretch, uv_vertices
 
 _POOR = 0.2  # share of the texture that charts fill, below which the other way of making charts is tried too
 _ROUNDS = 24  # of splitting charts that cover themselves
@@ -25,11 +26,12 @@ _ROUNDS = 24  # of splitting charts that cover themselves
 
 @dataclass(frozen=True)
 class Layout:
-    """chart: (F,) from 0. method: what made the charts. packing: UVs, scale and gutter."""
+    """chart: (F,) from 0. method: what made the charts. packing: UVs, scale and gutter. stretch: of the surface, 1 at best."""
 
     chart: NDArray[np.int32]
     method: str
     packing: Packing
+    stretch: float
 
     @property
     def uv(self) -> NDArray[np.float32]:
@@ -70,16 +72,21 @@ def _lay_out(
     texture_size: int, padding: int, method: str,
 ) -> Layout:  # fmt: skip
     """Mend charts, join neighbours unless that packs worse, and pack."""
+
+    def packed(flat: NDArray, chart: NDArray) -> Layout:
+        packing = pack(flat, triangles, chart, texture_size, padding)
+        return Layout(chart, method, packing, stretch(vertices[triangles], packing.uv))
+
     flat, chart = _mend(vertices, triangles, polygon, flat, chart)
-    apart = Layout(chart, method, pack(flat, triangles, chart, texture_size, padding))
-    flat, chart = stitch(flat, triangles, chart, texture_size, padding)
-    joined = Layout(chart, method, pack(flat, triangles, chart, texture_size, padding))
+    apart = packed(flat, chart)
+    flat, chart = merge(vertices, triangles, flat, chart, texture_size, padding)
+    joined = packed(*stitch(flat, triangles, chart, texture_size, padding))
     return max(joined, apart, key=_merit)
 
 
 def _merit(layout: Layout) -> tuple[int, float]:
-    """What makes one layout better than another: the gutter asked for, then texels."""
-    return layout.packing.gutter, layout.packing.texels_per_unit
+    """What makes one layout better than another: the gutter asked for, then texels where the texture is stretched."""
+    return layout.packing.gutter, layout.packing.texels_per_unit / layout.stretch
 
 
 def run_xatlas(

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from stages.prep import charts, unwrap, xatlas_worker
+from stages.prep.merge import SQUASHED
 from stages.prep.overlap import overlapping
 from stages.prep.pack import pack
 from stages.prep.stitch import stitch
@@ -80,13 +81,13 @@ def gap(uv: NDArray, chart: NDArray, size: int) -> float:
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_texels_are_spread_evenly(name: str) -> None:
-    """Projection may squash a face to its cosine to the chart, never more, and never stretches it."""
+    """Projection may squash a face to its cosine to the chart, never more; joined charts change lengths within a bound."""
     vertices, triangles = SHAPES[name]
     layout = unwrap.unwrap(vertices, triangles, np.arange(len(triangles)), SIZE, PADDING, 0.0)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     density = signed_area(layout.uv) * SIZE**2 / area / layout.packing.texels_per_unit**2
-    assert density.max() < 1.03 and density.min() > 0.3
+    assert density.max() < SQUASHED**-2 and density.min() > 0.3
 
 
 def test_polygons_that_charts_cut_become_charts_of_their_own() -> None:
