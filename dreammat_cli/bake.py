@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, library_option, lines_of, plan, reporter, show
 from stages.bake.options import SIZES, BakeOptions
 
 DEFAULT = defaults(BakeOptions)
@@ -20,6 +20,7 @@ DEFAULT = defaults(BakeOptions)
               metavar="N", help="N x N samples in each texel.")
 @click.option("--relief", type=click.FloatRange(0, 2), default=DEFAULT["relief"], show_default=True, metavar="X",
               help="How strongly the material's relief is shown, as a multiple; 0 writes no normal and height maps of it.")
+@library_option
 @click.option("--occlusion-rays", type=click.IntRange(1, 1 << 16), default=DEFAULT["occlusion_rays"], show_default=True,
               metavar="N", help="Rays from each point whose ambient occlusion is traced; others take the mean of those nearby.")
 @click.option("--preview-size", type=click.IntRange(32, 2048), default=DEFAULT["preview_size"], show_default=True,

@@ -28,6 +28,12 @@ INPUT = click.Path(path_type=Path)
 """A path to read; whether it can be read is the stage's to say, in its own words."""
 
 
+library_option = click.option(
+    "--library", type=INPUT, metavar="FOLDER", envvar="DREAMMAT_LIBRARY",
+    help="Scanned PBR sets (Poly Haven, ambientCG); what words name of them is used.  [env: DREAMMAT_LIBRARY]",
+)  # fmt: skip
+
+
 @dataclasses.dataclass(frozen=True)
 class Common:
     """The options that every command has."""

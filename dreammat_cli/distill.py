@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, library_option, lines_of, plan, reporter, show
 from stages.core.progress import Tell, untold
 from stages.distill.options import GIVEN, LOSSES, QUALITY, DistillOptions
 from stages.sd.options import SdOptions
@@ -24,6 +24,7 @@ def weight(name: str, text: str) -> Any:
 def understood(options: DistillOptions) -> Any:
     """The recipe that the prompt's words call for, before any mesh is known. Raises: InputError."""
     from stages.core.errors import InputError
+    from stages.material.library import Library
     from stages.prior.model import load_prior
     from stages.prior.prompt import read_prompt
 
@@ -31,7 +32,8 @@ def understood(options: DistillOptions) -> Any:
         raise InputError(f"--explain with --guidance {options.guidance}: it reads no words; expected --guidance prior")
     if not options.prompt.strip():
         raise InputError("--explain: no --prompt is given; say what the object is made of")
-    return read_prompt(options.prompt, load_prior(), options.seed, options.object_size)
+    library = Library(options.library) if options.library else None
+    return read_prompt(options.prompt, load_prior(), options.seed, options.object_size, library)
 
 
 def explain_words(common: Common, options: DistillOptions) -> None:
@@ -50,6 +52,7 @@ def explain_words(common: Common, options: DistillOptions) -> None:
 @click.option("--object-size", type=click.FloatRange(1e-3, 1e4), default=DEFAULT["object_size"], metavar="METRES",
               help="Length of its longest edge, which sizes bricks, grain and threads.  [default: what the words say]")
 @click.option("--explain", is_flag=True, help="Print what is understood of --prompt as a table, and stop.")
+@library_option
 @click.option("--negative-prompt", default=DEFAULT["negative_prompt"], show_default=True, metavar="TEXT",
               help="What the picture should not look like.")
 @click.option("--guidance", type=click.Choice(["prior", "sd", "reference"]), default=DEFAULT["guidance"], show_default=True,

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, library_option, plan, reporter, show
 from stages.swatch.options import SIZES, SwatchOptions
 
 DEFAULT = defaults(SwatchOptions)
@@ -16,6 +16,7 @@ DEFAULT = defaults(SwatchOptions)
 @click.option("--size", type=click.Choice(SIZES), default=DEFAULT["size"], show_default=True, metavar="TEXELS",
               help=f"Texture size: {', '.join(map(str, SIZES))}.")
 @click.option("--metres", type=float, metavar="M", help="Edge of the square; without it, what shows the structure best.")
+@library_option
 @click.option("--seed", type=click.IntRange(0), default=DEFAULT["seed"], show_default=True, metavar="N",
               help="Another seed draws other patterns of the same material.")
 @click.option("--preview-size", type=click.IntRange(32, 2048), default=DEFAULT["preview_size"], show_default=True,

@@ -1,6 +1,7 @@
 """Options of the bake stage; imports nothing heavy, so that the command line can show its help at once."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from stages.core.errors import InputError
 
@@ -17,6 +18,7 @@ class BakeOptions:
     preview_size: int = 320  # pixels along each edge of one view of preview.png
     occlusion_rays: int = 128  # of each point whose ambient occlusion is traced
     relief: float = 1.0  # how strongly what stands out of the surface is shown, as a multiple; 0 none
+    library: Path | None = None  # folder of scanned materials, for a material that uses some
 
     def __post_init__(self) -> None:
         """Raises: InputError that names the option, what was found and what is expected."""

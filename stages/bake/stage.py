@@ -109,11 +109,13 @@ def bake(
     mesh, made = load_npz(prep, PREP), load_npz(material, MATERIAL)
     inputs = {"prep": sha256_file(prep), "material": sha256_file(material)}
     expect_input(material, made.provenance, "prep", inputs["prep"], prep)
-    wanted = Provenance(plain_options(options), made.provenance.seed, inputs)
+    chosen = plain_options(options)
+    del chosen["library"]  # the material says by hash what it uses of it
+    wanted = Provenance(chosen, made.provenance.seed, inputs)
     known = peek(out, ASSET)
     if known and known.same_request(wanted) and not force:
         return BakeResult(out, True, sorted(read_manifest(out, ASSET)[1]), known.extra)
-    learnt = LearntMaterial.of(material, made)
+    learnt = LearntMaterial.of(material, made, options.library)
     with run_log(out) as measured:
         subject = Subject.of(prep, mesh, options.size)
         open_folder(out)

@@ -29,6 +29,7 @@ class DistillOptions:
     smoothness: float = 0.0  # * weight of ‖Γ(p) - Γ(p + ε)‖²
     prompt: str = ""  # what the object is made of
     object_size: float | None = None  # metres, longest edge; None: what the prompt's words say
+    library: Path | None = None  # folder of scanned materials, which are preferred
     negative_prompt: str = NEGATIVE_PROMPT  # what the picture should not look like
     loss: str = "csd"  # one of LOSSES: classifier score distillation, or the classic one; sets the next three
     eta1: float | None = None  # weight of the positive prediction, Eq. 7; None: what loss and guidance call for

@@ -31,6 +31,7 @@ from stages.distill.preview import write_preview
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
 from stages.distill.start import least_like_light
 from stages.distill.views import Views
+from stages.material.library import Library, hashes
 from stages.material.recipe import EVEN, Recipe
 from stages.material.residual import Residual, ResidualConfig, combined
 from stages.prior.explain import parts
@@ -166,11 +167,18 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
     model = load_prior(device)
     sampler = CropSampler(views, model.size, options.batch, device, options.lights)
 
+    library = Library(options.library) if options.library else None
+    recipe = read_prompt(options.prompt, model, options.seed, options.object_size, library)
+    scans = library.used({coat.look for coat in recipe.coats}) if library else {}
+
     def begin() -> Recipe:
-        recipe = read_prompt(options.prompt, model, options.seed, options.object_size)
         return least_like_light(recipe, views, step_generator(options.seed, POOL))
 
-    return prior.PriorGuidance(model, sampler, options, begin)
+    guidance = prior.PriorGuidance(model, sampler, options, begin)
+    if scans:
+        guidance.identity = guidance.identity | {"library": scans}
+        guidance.inputs |= hashes(scans)
+    return guidance
 
 
 def _stable_diffusion(options: DistillOptions, views: Views, device: torch.device) -> Guidance:
@@ -361,7 +369,7 @@ def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Gu
     if guidance.weights:
         chosen |= plain_options(guidance.weights)
     chosen["reference"] = options.reference.name if options.reference else None
-    del chosen["sd"], chosen["quality"]  # its models are known by their hashes, and it by its steps
+    del chosen["sd"], chosen["quality"], chosen["library"]  # its models are known by their hashes, and it by its steps
     inputs = {"conditions": views.digest, "prep": views.prep, **guidance.inputs}
     extra = {"prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments}
     return Provenance(chosen, options.seed, inputs, extra)

@@ -5,8 +5,10 @@ from pathlib import Path
 
 from stages.core.artifact import Artifact
 from stages.core.errors import ArtifactError
+from stages.material.library import Library
 from stages.material.recipe import Recipe
 from stages.material.residual import Residual
+from stages.material.substances import LOOKS
 from stages.material.survey import Lookup, Survey
 
 
@@ -19,11 +21,17 @@ class LearntMaterial:
     residual: Residual
 
     @staticmethod
-    def of(path: Path, made: Artifact) -> "LearntMaterial":
-        """From material.npz as loaded. Raises: ArtifactError when header and arrays disagree."""
+    def of(path: Path, made: Artifact, library: Path | None = None) -> "LearntMaterial":
+        """From material.npz as loaded. Args: library: folder of the scans that it uses, if it uses any.
+
+        Raises: ArtifactError when header and arrays disagree, or a scan is missing; InputError of the library."""
         try:
             extra = made.provenance.extra
             recipe, residual = Recipe.from_json(extra["recipe"]), Residual.from_arrays(extra["residual"], made.arrays)
         except (KeyError, TypeError, ValueError) as error:
             raise ArtifactError(f"{path}: its material does not fit its header ({error}); distill it again") from error
+        looks = {coat.look for coat in recipe.coats}
+        missing = Library(library).restore(looks) if library else sorted(looks - set(LOOKS))
+        if missing:
+            raise ArtifactError(f"{path}: it is made of {missing[0]}, a scan; give --library, the folder that has it unchanged")
         return LearntMaterial(recipe, Lookup(Survey.from_arrays(made.arrays)), residual)

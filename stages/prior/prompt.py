@@ -12,8 +12,10 @@ from typing import Protocol
 import numpy as np
 from torch import Tensor
 
-from stages.core.color import srgb_decode
-from stages.material.look import to_oklab
+from stages.core.color import srgb_decode, srgb_encode
+from stages.material.evaluate import means
+from stages.material.library import Library
+from stages.material.look import from_oklab, to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
@@ -72,16 +74,21 @@ class Words(Protocol):
         """Mean sRGB albedo, roughness and metallic of B prompts, (B, 5)."""
 
 
-def read_prompt(prompt: str, prior: Words, seed: int, metres: float | None = None) -> Recipe:
-    """What the words of a prompt call for. Args: metres: longest edge of the object, where it is known."""
-    return Reading(prior, metres).recipe(prompt, seed)
+def read_prompt(prompt: str, prior: Words, seed: int, metres: float | None = None, library: Library | None = None) -> Recipe:
+    """What the words of a prompt call for.
+
+    Args:
+        metres: longest edge of the object, where it is known. library: scanned materials, which are preferred. """
+    return Reading(prior, metres, library=library).recipe(prompt, seed)
 
 
 class Reading:
     """One reading of a prompt. Args: as `read_prompt`; looks: names of those that there are."""
 
-    def __init__(self, prior: Words, metres: float | None = None, looks: Collection[str] = LOOKS) -> None:
-        self._prior, self._metres, self._looks = prior, metres, looks
+    def __init__(
+        self, prior: Words, metres: float | None = None, looks: Collection[str] = LOOKS, library: Library | None = None
+    ) -> None:
+        self._prior, self._metres, self._looks, self._library = prior, metres, looks, library
 
     def recipe(self, prompt: str, seed: int) -> Recipe:
         """See `read_prompt`."""
@@ -235,7 +242,26 @@ class Reading:
         hue = any(word in COLORS or word.startswith("#") for word in phrase.colors)
         if metallic and hue and wanted.look != "brushed aluminium":
             color = _triple(0.6 * np.array(_color(phrase)) + 0.4 * np.array(_color(phrase)) * np.array(wanted.color))
-        return self._sized(Coat(look, color, float(roughness), metallic, said=f"{name} {_said(phrase)}".strip()))
+        coat = Coat(look, color, float(roughness), metallic, said=f"{name} {_said(phrase)}".strip())
+        return self._sized(self._scanned(coat, wanted, phrase))
+
+    def _scanned(self, coat: Coat, wanted: Stuff, phrase: Phrase) -> Coat:
+        """The same coat as the library has it, with the scan's own colour and roughness where words name none."""
+        if self._library is None or wanted.family == "paint":
+            return coat
+        own = set() if phrase.substance in GENERIC else set(wanted.look.split())
+        head = {word.removesuffix("s") for word in {*phrase.substance.split(), *phrase.unknown} | own - set(FINISH_LOOKS)}
+        also = (*phrase.weather, *phrase.finish, wanted.family, *phrase.thing.split())
+        found = self._library.match(head | {word.removesuffix("s") for word in also}, head)
+        if found is None:
+            return coat
+        look = self._library.use(found)
+        mean = means(look)
+        named = any(map(is_hue, phrase.colors)) or any(word in COLORS for word in phrase.substance.split())
+        color = coat.color if named else _encoded(mean.lab)
+        rough = coat.roughness if _roughness(phrase, bool(wanted.metallic)) else mean.roughness
+        metal = None if {"metallic", "packed"} & set(found.maps) else coat.metallic
+        return replace(coat, look=look, color=color, roughness=rough, metallic=metal)
 
     def _unknown(self, phrase: Phrase) -> Coat:
         """A phrase with words that no table knows: its means by the reader, its look by the nearest name."""
@@ -509,6 +535,11 @@ def _worn(coat: Coat) -> Coat:
 def _faded(color: np.ndarray, phrase: Phrase) -> RGB:
     keep = float(np.prod([FADED.get(word, 1.0) for word in phrase.weather]))
     return _triple(np.mean(color) + keep * (np.asarray(color) - np.mean(color)))
+
+
+def _encoded(lab: np.ndarray) -> RGB:
+    """sRGB of OKLab."""
+    return _triple(srgb_encode(from_oklab(lab[:, None])[:, 0]))
 
 
 def _triple(color: np.ndarray) -> RGB:

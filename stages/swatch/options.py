@@ -1,6 +1,7 @@
 """Options of the swatch stage; imports nothing heavy, so that the command line can show its help at once."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from stages.core.errors import InputError
 
@@ -16,6 +17,7 @@ class SwatchOptions:
     size: int = 2048  # texels along each edge, one of SIZES
     metres: float | None = None  # edge of the square; None: what shows the structure of its substance best
     seed: int = 0  # of its patterns
+    library: Path | None = None  # folder of scanned materials, which are preferred
     preview_size: int = 384  # pixels along each edge of one picture of preview.png
 
     def __post_init__(self) -> None:

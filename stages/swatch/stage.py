@@ -14,6 +14,7 @@ from stages.core.images import write_png
 from stages.core.parallel import cores
 from stages.core.progress import Progress, silent
 from stages.material.directions import WHOLE
+from stages.material.library import Library, hashes
 from stages.material.masks import settled
 from stages.material.recipe import Recipe
 from stages.material.relief import gentle
@@ -45,12 +46,17 @@ class SwatchResult:
 def make_swatch(out: Path, options: SwatchOptions, force: bool = False, progress: Progress = silent) -> SwatchResult:
     """Write the maps of a prompt's material. Raises: InputError, ArtifactError, OutputError."""
     prior = load_prior()
-    wanted = Provenance(plain_options(options), options.seed, {"prior": prior.identity["weights"]})
+    library = Library(options.library) if options.library else None
+    read = read_prompt(options.prompt, prior, options.seed, options.metres, library)
+    scans = library.used({coat.look for coat in read.coats}) if library else {}
+    chosen = plain_options(options)
+    del chosen["library"]
+    wanted = Provenance(chosen, options.seed, {"prior": prior.identity["weights"], **hashes(scans)})
     known = peek(out, SWATCH)
     if known and known.same_request(wanted) and not force:
         return SwatchResult(out, True, sorted(read_manifest(out, SWATCH)[1]), known.extra)
     with run_log(out) as measured:
-        recipe = flat(read_prompt(options.prompt, prior, options.seed, options.metres))
+        recipe = flat(read)
         progress("maps", 0, 1)
         maps = tile(recipe, options.size)
         progress("files", 0, 1)
@@ -62,6 +68,7 @@ def make_swatch(out: Path, options: SwatchOptions, force: bool = False, progress
         progress("preview", 1, 1)
         rows = [dict(zip(HEADINGS, row, strict=True)) for row in explained(recipe)]
         report = {"prompt": options.prompt, "understood": rows, "metres": recipe.base.metres, "recipe": recipe.to_json()}
+        report |= {"library": scans} if scans else {}
         write_manifest(out, SWATCH, Provenance(wanted.options, wanted.seed, wanted.inputs, report), files)
         measured["texture_size"] = options.size
     return SwatchResult(out, False, sorted(files), report)
