@@ -39,7 +39,7 @@ RAKING = np.array([0.75, 0.5, 0.43])
 class Row:
     """One substance. seconds: of its swatch. nearest: of the references, and how far away.
 
-    own: how far away the nearest of its own kind is. flicker: how much a view changes with the textures' size.
+    own: how far away the nearest of its own kinds is, kinds: those. flicker: how much a view changes with the textures' size.
     """
 
     name: str
@@ -48,6 +48,7 @@ class Row:
     nearest: str = ""
     distance: float = float("nan")
     own: float = float("nan")
+    kinds: tuple[str, ...] = ()
     flicker: float = float("nan")
 
 
@@ -101,8 +102,31 @@ def placed(name: str, seconds: float, contrast: Contrast, known: dict[str, Contr
         return Row(name, seconds, contrast)
     away = {other: distance(contrast, found, scale) for other, found in known.items()}
     nearest = min(away, key=lambda other: away[other])
-    own = [d for other, d in away.items() if kind(other) in name.replace(" ", "_").split("_")]
-    return Row(name, seconds, contrast, nearest, away[nearest], min(own, default=float("nan")))
+    own = {other: d for other, d in away.items() if kind(other) in kinds(name)}
+    least = min(own.values(), default=float("nan"))
+    return Row(name, seconds, contrast, nearest, away[nearest], least, tuple(sorted({kind(other) for other in own})))
+
+
+KIN = {
+    "wood": ("oak", "walnut", "pine", "cherry", "mahogany", "maple", "birch", "ebony", "teak", "cedar"),
+    "metal": ("steel", "iron", "aluminium"), "weave": ("fabric", "canvas", "linen"),
+}  # fmt: skip
+"""Kinds of references, and substances of them whose names do not say so."""
+
+
+def kinds(name: str) -> set[str]:
+    """Kinds of references to which a substance may be compared."""
+    words = set(name.split())
+    return words | {kind for kind, kin in KIN.items() if words & set(kin)}
+
+
+def by_kind(rows: list[Row]) -> dict[str, float]:
+    """Distance to the nearest real set of each kind, the median of the substances that are of it."""
+    found: dict[str, list[float]] = {}
+    for row in rows:
+        for one in row.kinds:
+            found.setdefault(one, []).append(row.own)
+    return {one: float(np.median(distances)) for one, distances in found.items()}
 
 
 def halved(made: Swatch) -> Swatch:
@@ -153,7 +177,6 @@ def table(rows: list[Row]) -> str:
 def summary(rows: list[Row]) -> list[str]:
     """What all of it comes to, for people."""
     slopes = np.array([row.contrast.slope for row in rows])
-    own = np.array([row.own for row in rows if np.isfinite(row.own)])
     related = [np.nanmax(np.abs([row.contrast.with_roughness, row.contrast.with_height, 0.0])) for row in rows]
     lines = [
         f"{len(rows)} substances; slope of contrast an octave {np.median(slopes):.2f} in the median, "
@@ -162,9 +185,10 @@ def summary(rows: list[Row]) -> list[str]:
     ]
     flickers = np.array([row.flicker for row in rows])
     lines.append(f"textures of 1024² and 4096² look alike to 1 % RMSE in {np.mean(flickers <= 0.01):.0%}")
+    own = np.array(list(by_kind(rows).values()))
     if len(own):
         lines.append(
-            f"distance to the nearest real set of the kind: {np.median(own):.2f} in the median of {len(own)}, "
+            f"distance to the nearest real set of the kind: {np.median(own):.2f} in the median of {len(own)} kinds, "
             f"{np.mean(own <= 1.1):.0%} within 1.1"
         )
     return lines

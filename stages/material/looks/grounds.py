@@ -213,6 +213,10 @@ def snow(at: Place) -> Look:
     trodden = masked(warped(at, 0.01, 0.06, 6, 3), Spectrum(0.11, 0.002, 0.62, (1, 1.6, 1), 0.3, patch=0.5), 0.03, 7, 0.5)
     color = palette(0.60 - 0.30 * hollow + 0.06 * crust, "#c3cfdd", "#d9e0e8", "#e8ebee", "#f3f4f4")
     color = shade(color, 0.045 * grain + 0.02 * crust + 0.08 * spark - 0.10 * trodden)
+    twig = marks(at, 0.07, 0.0022, 2, 0.0, 2 * np.pi, 8, 0.85, 0.5)  # what the wind broke off
+    crumb = spots(warped(at, 0.002, 0.006, 9, 3), 0.06, (0.0006, 0.004), 0.25, 10).cover
+    fallen = np.clip(twig.cover * (twig.random(1) < 0.05) + 0.9 * crumb, 0, 1)
+    color = mix(color, palette(0.5 + 0.2 * grain, "#3a2f26", "#5c4b3c", "#83705c"), 0.85 * fallen)
     return Look(
         color,
         np.clip(0.72 + 0.06 * grain + 0.04 * crust - 0.5 * spark, 0.1, 1),

@@ -109,10 +109,10 @@ def cast(at: Place, kind: Metal) -> Look:
 def hammered(at: Place, kind: Metal) -> Look:
     """Round dents from the hammer, each a shallow bowl that cuts into those before it, soft ridges where they meet."""
     bent = warped(at, 0.0006, 0.02, 1)
-    dent, late = cells(bent, 0.016, 2, 0.75, (1, 1, 4)), cells(bent, 0.021, 4, 0.8, (1, 1, 4))
+    dent, late = cells(bent, 0.016, 2, 0.75), cells(bent, 0.021, 4, 0.8)
     shown = fading(0.012, at.footprint)
     bowls = [(0.75 + 0.5 * blow.random(1)) * (blow.near / blow.size) ** 2 for blow in (dent, late)]
-    bowl = (np.minimum(bowls[0], bowls[1] + 0.06 + 0.16 * late.random(3)) - 0.20) * shown
+    bowl = (np.minimum(bowls[0], bowls[1] + 0.06 + 0.16 * late.random(3)) - 0.28) * shown
     fine = fbm(at, Spectrum(0.003, 0.0003, 1.1, tails=0.4, patch=0.3), 3)
     look = worked(at, kind, 0.22, 1.5e-3 * bowl, 0.5 * fine + 1.5 * bowl)
     return look._replace(color=shade(look.color, 0.35 * bowl + 0.05 * (dent.random(2) - 0.5) * shown))
