@@ -46,7 +46,7 @@ PARTS = _table(
     ("handle, grip, hilt, haft, pommel, shaft, handles, handlebar, stock", Region("below", 0.3)),
     ("front, front side, fascia, door, front half, screen, windows, window, windshield, chest plate", Region("front", 0.3)),
     ("beak, nose, snout, eyes, nozzle, toe, toes, toe cap, toe caps, toecap, toecaps", Region("front", 0.12)),
-    ("back side, rear, reverse, back half, tail, backside", Region("back", 0.3)),
+    ("back, back side, rear, reverse, back half, tail, backside", Region("back", 0.3)),
     ("left half, left side, left", Region("left", 0.5)), ("right half, right side, right", Region("right", 0.5)),
     ("belly, underbelly, bottom side", Region("down", 0.3)),
     ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "

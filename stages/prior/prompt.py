@@ -213,6 +213,8 @@ class Reading:
             if inner.substance == "painted metal" and any(word in FINISHES_METAL for word in inner.finish):
                 inner.substance = "paint"
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
+        if phrase.colors and phrase.where.split(" ")[-1] in SOFT:
+            return self._of(stuff("fabric", True), phrase)
         if beneath is not None and phrase.colors:  # of the same stuff
             kind = phrase.region.kind if phrase.region else JOINED.get(phrase.join.kind, JOINED["with"]).kind
             raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone")
@@ -368,6 +370,8 @@ def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
 
 def _stands(first: Phrase, second: Phrase) -> bool:
     """Whether a thing stands on its own part, "a dragon on a wooden base", rather than a stuff on what is beneath."""
+    if second.join.kind in ("peel", "through"):
+        return False  # "paint peeling off a door"
     part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
     thing = bool(first.thing and first.substance) and second.join.kind == "on" and not second.thing
     return (part or thing) and not first.region and first.substance not in GATHERS
@@ -433,6 +437,9 @@ def _gaudy(phrase: Phrase) -> bool:
     _, *chroma = to_oklab(srgb_decode(np.array(_color(phrase)))[:, None])[:, 0]
     return bool(np.hypot(*chroma) > GREYISH and (chroma[1] < 0.6 * np.hypot(*chroma)))
 
+
+SOFT = ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching")
+"""Parts that are of cloth where words name their colour alone."""
 
 DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "silver", "brass", "bronze", "copper", "chrome"])
 """Metals that take colour as metals, or have their own."""
@@ -500,7 +507,7 @@ def _described(wanted: Stuff, named: RGB) -> RGB:
     if wanted.paintable or wanted.metallic:
         return named
     own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
-    if float(np.linalg.norm(own - other)) > SIMILAR:
+    if float(np.linalg.norm(own - other)) > SIMILAR or np.hypot(*other[1:]) < GREYISH / 2 < np.hypot(*own[1:]) / 2:
         return named
     return _triple(np.array(wanted.color) + 0.3 * (np.array(named) - np.array(wanted.color)))
 
