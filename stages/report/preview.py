@@ -157,6 +157,7 @@ def cycles(asset: str, folder: str) -> None:
     scene.cycles.max_bounces, scene.cycles.samples, scene.cycles.pixel_filter_type = 0, SAMPLES, "BOX"
     bpy.ops.import_scene.gltf(filepath=str(Path(asset) / "model.glb"))
     for material in bpy.data.materials:
+        material.cycles.emission_sampling = "NONE"  # else each triangle that might shine takes samples from the light
         for node in material.node_tree.nodes if material.use_nodes else ():
             if node.type == "BSDF_PRINCIPLED":
                 node.distribution = "GGX"
