@@ -8,10 +8,11 @@ import click
 
 from dreammat_cli.common import INPUT, Common, common_options, defaults, library_option, lines_of, plan, reporter, show
 from stages.core.progress import Tell, untold
-from stages.distill.options import GIVEN, LOSSES, QUALITY, DistillOptions
+from stages.distill.options import GIVEN, LOSSES, QUALITY, DistillOptions, HoldOptions, ScoreOptions
 from stages.sd.options import SdOptions
 
-DEFAULT, SD = defaults(DistillOptions), defaults(SdOptions)
+SCORE, HOLD, SD = defaults(ScoreOptions), defaults(HoldOptions), defaults(SdOptions)
+DEFAULT = defaults(DistillOptions) | SCORE | HOLD
 UNIT = click.FloatRange(0)
 
 
@@ -95,8 +96,8 @@ def command(conditions: Path, output: Path, common: Common, explain: bool, **cho
 
     Stopped by Ctrl-C or a kill, the same command continues; on a CPU the result has the same bytes either way.
     """
-    sd = SdOptions(**{name: chosen.pop(name) for name in SD})
-    options = DistillOptions(**chosen, sd=sd)
+    sd, score, hold = ({name: chosen.pop(name) for name in group} for group in (SD, SCORE, HOLD))
+    options = DistillOptions(**chosen, sd=SdOptions(**sd), score=ScoreOptions(**score), hold=HoldOptions(**hold))
     if explain:
         explain_words(common, options)
         return

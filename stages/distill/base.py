@@ -1,13 +1,16 @@
-"""The recipe on the surface that the views show: what a run begins from, and what the residual is added to."""
+"""The recipe on the surface that the views show: what a run begins from, and what is learnt is added to."""
+
+import copy
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from stages.core.shading import Material
+from stages.distill.moves import Moves
 from stages.distill.sampling import Sample
 from stages.distill.views import Views
-from stages.material.evaluate import evaluate
+from stages.material.evaluate import evaluate_coats
 from stages.material.masks import settled
 from stages.material.recipe import Recipe
 from stages.material.residual import Residual, combined
@@ -25,19 +28,30 @@ class Base:
         self.survey: Lookup = views.survey
         self.recipe = settled(recipe, even_surface(views, SETTLE_POINTS), self.survey.survey.pieces)
 
-    def at(self, points: Tensor, normals: Tensor, footprint: Tensor) -> Tensor:
-        """(P, 5) linear albedo, roughness and metallic of points (P, 3) with normals (P, 3) and footprints (P,), world."""
-        surface = self.survey.surface(*(t.cpu().numpy() for t in (points, normals, footprint)))
-        values = evaluate(self.recipe, surface, self.survey.survey.pieces)[:, :5]
-        return torch.from_numpy(np.ascontiguousarray(values)).to(points.device)
+    def at(self, points: Tensor, normals: Tensor, footprint: Tensor) -> tuple[Tensor, Tensor]:
+        """Material of points (P, 3) with normals (P, 3) and footprints (P,), world.
 
-    def of(self, sample: Sample) -> Tensor:
+        Returns:
+            (P, 5) linear albedo, roughness and metallic; (P, K) how much of each point is each coat's.
+        """
+        surface = self.survey.surface(*(t.cpu().numpy() for t in (points, normals, footprint)))
+        values, shares = evaluate_coats(self.recipe, surface, self.survey.survey.pieces)
+        both = (torch.from_numpy(np.ascontiguousarray(a)).to(points.device) for a in (values[:, :5], shares))
+        return next(both), next(both)
+
+    def of(self, sample: Sample) -> tuple[Tensor, Tensor]:
         """The same of a sample's points."""
         return self.at(sample.points, sample.normals, sample.footprint)
 
     def material(self, residual: Residual, points: Tensor, normals: Tensor, footprint: Tensor) -> Material:
         """Recipe and residual together."""
-        return Material.of(combined(self.at(points, normals, footprint), residual(points)))
+        return Material.of(combined(self.at(points, normals, footprint)[0], residual(points)))
+
+    def moved(self, moves: Moves) -> "Base":
+        """The same surface with the recipe's numbers moved."""
+        result = copy.copy(self)
+        result.recipe = moves.moved(self.recipe)
+        return result
 
 
 def even_surface(views: Views, count: int) -> Surface:

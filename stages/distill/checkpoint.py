@@ -17,9 +17,11 @@ from types import FrameType
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 
 from stages.core.artifact import Artifact, Field, Provenance, Schema, load_npz, save_npz
 from stages.core.errors import ArtifactError
+from stages.distill.moves import COLUMNS, Moves
 from stages.distill.optimizer import RowAdam
 from stages.material.residual import Residual
 
@@ -32,12 +34,16 @@ GRACE = 3.0
 _NETWORK = ("weights_0", "weights_1", "bias_0", "bias_1")
 CHECKPOINT = Schema(
     "dreammat.distill.checkpoint",
-    2,
+    3,
     {
         "table": Field("f4", ("T", "C")),
         "m.table": Field("f4", ("T", "C")),
         "v.table": Field("f4", ("T", "C")),
         "count.table": Field("i4", ("T",)),
+        "offsets": Field("f4", ("K", COLUMNS)),
+        "m.offsets": Field("f4", ("K", COLUMNS)),
+        "v.offsets": Field("f4", ("K", COLUMNS)),
+        "count.offsets": Field("i4", ("K",)),
         **{name: Field("f4", (f"{name}.0", *(() if name.startswith("bias") else (f"{name}.1",)))) for name in _NETWORK},
         **{f"{kind}.{name}": Field("f4", (1, f"{name}.size")) for name in _NETWORK for kind in "mv"},
         **{f"count.{name}": Field("i4", (1,)) for name in _NETWORK},
@@ -49,12 +55,18 @@ CHECKPOINT = Schema(
 
 @dataclass
 class State:
-    """A run between two steps: residual, optimiser, and of every step done its loss and the seconds since the start."""
+    """A run between two steps: residual, moves of the recipe, optimiser, and of every step done its loss and the seconds since
+    the start."""
 
     residual: Residual
+    moves: Moves
     optimizer: RowAdam
     loss: list[float] = field(default_factory=list)
     seconds: list[float] = field(default_factory=list)
+
+    def parameters(self) -> dict[str, nn.Parameter]:
+        """All that is learnt, by name."""
+        return {**dict(self.residual.named_parameters()), **dict(self.moves.named_parameters())}
 
     @property
     def step(self) -> int:
@@ -76,7 +88,8 @@ def checkpoint_path(out: Path) -> Path:
 def save(out: Path, state: State, request: Provenance) -> None:
     """Write the checkpoint, atomically."""
     curve: dict[str, NDArray] = {"loss": np.array(state.loss, np.float32), "seconds": np.array(state.seconds, np.float64)}
-    arrays: dict[str, NDArray] = {**state.residual.to_arrays(), **state.optimizer.to_arrays(), **curve}
+    learnt = {name: value.detach().cpu().numpy() for name, value in state.parameters().items()}
+    arrays: dict[str, NDArray] = {**learnt, **state.optimizer.to_arrays(), **curve}
     save_npz(checkpoint_path(out), CHECKPOINT, arrays, request)
 
 
@@ -89,7 +102,7 @@ def resume(out: Path, state: State, request: Provenance) -> bool:
     if not stored.provenance.same_request(request) or not _fits(stored, state):
         return False
     with torch.no_grad():
-        for name, parameter in state.residual.named_parameters():
+        for name, parameter in state.parameters().items():
             parameter.copy_(torch.from_numpy(stored[name]))
     state.loss, state.seconds = stored["loss"].tolist(), stored["seconds"].tolist()
     state.optimizer.load_arrays(stored.arrays, state.step)
@@ -97,8 +110,8 @@ def resume(out: Path, state: State, request: Provenance) -> bool:
 
 
 def _fits(stored: Artifact, state: State) -> bool:
-    """Whether a checkpoint is of this residual, and its counts of steps can be counts."""
-    shapes = all(stored[name].shape == tuple(p.shape) for name, p in state.residual.named_parameters())
+    """Whether a checkpoint is of this residual and recipe, and its counts of steps can be counts."""
+    shapes = all(stored[name].shape == tuple(p.shape) for name, p in state.parameters().items())
     counts = [array for name, array in stored.arrays.items() if name.startswith("count.")]
     return shapes and all(int(array.min()) >= 0 and int(array.max()) <= len(stored["loss"]) for array in counts)
 

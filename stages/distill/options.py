@@ -15,6 +15,27 @@ NEGATIVE_PROMPT = "blurry, low quality, noisy, shadows, highlights, baked lighti
 
 
 @dataclass(frozen=True)
+class ScoreOptions:
+    """How a diffusion model's predictions become a gradient."""
+
+    negative_prompt: str = NEGATIVE_PROMPT  # what the picture should not look like
+    loss: str = "csd"  # one of LOSSES: classifier score distillation, or the classic one; sets the next three
+    eta1: float | None = None  # weight of the positive prediction, Eq. 7; None: what loss and guidance call for
+    eta2: tuple[float, float] | None = None  # of the negative one, at the start and from two thirds on; None: likewise
+    posterior: float | None = None  # share of (eps_pos - noise) added to the classifier score; None: likewise
+    given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
+
+
+@dataclass(frozen=True)
+class HoldOptions:
+    """What holds the material itself."""
+
+    anchor: float = 0.5  # weight of the squared distance from what the words alone call for
+    bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end
+    smoothness: float = 0.0  # weight of ‖Γ(p) - Γ(p + ε)‖², for every guidance
+
+
+@dataclass(frozen=True)
 class DistillOptions:
     """Options of `stages.distill.stage.distill`; `--guidance reference` uses those marked * and nothing below them."""
 
@@ -26,17 +47,10 @@ class DistillOptions:
     learning_rate: float | None = None  # * of Adam, at the start; None: what the guidance calls for
     seed: int = 0  # *
     device: str = "cpu"  # * a torch device
-    smoothness: float = 0.0  # * weight of ‖Γ(p) - Γ(p + ε)‖²
     prompt: str = ""  # what the object is made of
     object_size: float | None = None  # metres, longest edge; None: what the prompt's words say
     library: Path | None = None  # folder of scanned materials, which are preferred
-    negative_prompt: str = NEGATIVE_PROMPT  # what the picture should not look like
-    loss: str = "csd"  # one of LOSSES: classifier score distillation, or the classic one; sets the next three
-    eta1: float | None = None  # weight of the positive prediction, Eq. 7; None: what loss and guidance call for
-    eta2: tuple[float, float] | None = None  # of the negative one, at the start and from two thirds on; None: likewise
-    posterior: float | None = None  # share of (eps_pos - noise) added to the classifier score; None: likewise
-    anchor: float = 0.5  # weight of the squared distance from what the words alone call for
-    given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
+    score: ScoreOptions = field(default_factory=ScoreOptions)
+    hold: HoldOptions = field(default_factory=HoldOptions)
     lights: str = "all"  # environments that steps are lit by: "all", or "one", the first
-    bimodal: float = 0.02  # weight of m (1 - m), which sends metallic to 0 or 1 towards the end
     sd: SdOptions = field(default_factory=SdOptions)  # models and memory of Stable Diffusion

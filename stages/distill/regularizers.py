@@ -37,15 +37,18 @@ def hold(residual: Tensor) -> Tensor:
     return residual.square().sum(-1).mean() * SLOPE**2
 
 
-def baked_light(material: Material, base: Tensor, irradiance: Tensor) -> Tensor:
-    """How much of what departs from the recipe's albedo follows the light: the variance that log irradiance explains.
+def baked_light(material: Material, even: Tensor, irradiance: Tensor) -> Tensor:
+    """How much of what varies within the coats follows the light: the variance of log albedo that log irradiance explains.
+
+    Also what patterns have in common with the light by chance: to an eye it is baked in. Where coats lie is left alone, since
+    moss in crevices may follow it.
 
     Differentiable in: material.
 
     Args:
-        base: (P, 5) linear albedo, roughness, metallic. irradiance: (P, 3) linear, of any scale.
+        even: (P, 3) linear albedo if each coat were of one colour. irradiance: (P, 3) linear, of any scale.
     """
-    departure = torch.log((luminance(material.albedo) + DIM) / (luminance(base[:, :3]) + DIM))
+    departure = torch.log((luminance(material.albedo) + DIM) / (luminance(even) + DIM))
     light = luminance(irradiance)
     light = torch.log(light / light.mean().clamp(min=1e-9) + DIM)
     light = light - light.mean()

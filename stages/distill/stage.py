@@ -25,6 +25,7 @@ from stages.distill.checkpoint import State, step_generator
 from stages.distill.gauss_newton import logit_gradient, proposal
 from stages.distill.guidance.base import Budget, Guidance, Response
 from stages.distill.leaps import UNTIL, leaps
+from stages.distill.moves import Moves, told
 from stages.distill.optimizer import RowAdam
 from stages.distill.options import QUALITY, DistillOptions
 from stages.distill.preview import write_preview
@@ -41,7 +42,7 @@ SEEN_BY = 3
 """A surface point is taken to be seen by one view in this many."""
 
 UNLIT = 10.0
-"""Weight of what departs from the expected material along with the light, as a multiple of the anchor's."""
+"""Weight of what varies along with the light within the coats, as a multiple of the anchor's."""
 
 POOL = 2**32
 """In place of a step's number where a pool of pixels is chosen: no step has it."""
@@ -103,10 +104,11 @@ def _distill(
         checkpoint.checkpoint_path(out).unlink(missing_ok=True)
         return DistillResult(budget.steps, 0, math.nan, True)
     with run_log(out) as log:
-        state = new_state(options, views, device)
+        base = Base(guidance.recipe, views)
+        state = new_state(options, views, device, base.recipe)
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
-        run = Run(out, views, guidance, Base(guidance.recipe, views), options, budget, request, state, clock)
+        run = Run(out, views, guidance, base, options, budget, request, state, clock)
         for line in parts(guidance.recipe) if guidance.recipe != EVEN else ():
             tell(line)
         if not resumed:
@@ -114,6 +116,8 @@ def _distill(
         _all_steps(run, progress)
         _write(run)
         _preview(run)
+        for line in told(run.base.recipe, state.moves.moved(run.base.recipe)):
+            tell(line)
         log |= {"milliseconds_per_step": clock.per_step(state.step - resumed), "steps": state.step, "resumed": resumed}
     checkpoint.checkpoint_path(out).unlink(missing_ok=True)
     return DistillResult(state.step, resumed, state.loss[-1], False)
@@ -191,12 +195,14 @@ def _stable_diffusion(options: DistillOptions, views: Views, device: torch.devic
     return sd.StableDiffusionGuidance(model, sampler, options)
 
 
-def new_state(options: DistillOptions, views: Views, device: torch.device) -> State:
-    """Residual and optimiser before the first step; the finest cells are as far apart as the surface points that all views
-    see."""
+def new_state(options: DistillOptions, views: Views, device: torch.device, recipe: Recipe) -> State:
+    """What is learnt, and optimiser, before the first step; the finest cells are as far apart as the surface points that all
+    views see."""
     spacing = views.pixel_size() / math.sqrt(max(1.0, len(views.seen) / SEEN_BY))
     residual = Residual(ResidualConfig.for_detail(spacing), torch.Generator().manual_seed(options.seed)).to(device)
-    return State(residual, RowAdam(dict(residual.named_parameters()), tables=frozenset({"table"})))
+    moves = Moves(recipe).to(device)
+    parameters = {**dict(residual.named_parameters()), **dict(moves.named_parameters())}
+    return State(residual, moves, RowAdam(parameters, tables=frozenset({"table", "offsets"})))
 
 
 def _all_steps(run: Run, progress: Progress) -> None:
@@ -222,10 +228,12 @@ def _all_steps(run: Run, progress: Progress) -> None:
 
 @dataclass(frozen=True)
 class Shown:
-    """What a step shows: a sample, the recipe's material of its points (P, 5), and the generator that draws the rest."""
+    """What a step shows: a sample, the recipe's material of its points (P, 5), how much of each is each coat's (P, K), and the
+    generator that draws the rest."""
 
     sample: Sample
     base: Tensor
+    shares: Tensor
     generator: torch.Generator
 
 
@@ -236,8 +244,8 @@ def draw(run: Run, step: int) -> Shown:
         sample = run.guidance.draw(generator)
         run.guidance.sampler.prefetch(step_generator(run.options.seed, step + 1))
     with run.clock("recipe"):
-        base = run.base.of(sample)
-    return Shown(sample, base, generator)
+        base, shares = run.base.of(sample)
+    return Shown(sample, base, shares, generator)
 
 
 def optimisation_step(run: Run, shown: Shown) -> float:
@@ -246,7 +254,8 @@ def optimisation_step(run: Run, shown: Shown) -> float:
     sample, base, generator = shown.sample, shown.base, shown.generator
     with clock("residual"):
         learnt, nearby = _residuals(state.residual, sample, options, generator)
-        material = Material.of(combined(base, learnt))
+        moved = state.moves(base, shown.shares) if run.guidance.held else torch.zeros_like(learnt)
+        material = Material.of(combined(base, learnt + moved))
     with clock("shading"):
         radiance = shade(sample.transport, material)
     with clock("guidance"):
@@ -254,7 +263,8 @@ def optimisation_step(run: Run, shown: Shown) -> float:
     if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
-        losses = _regularizers(Learnt(material, base, learnt, nearby), sample, run)
+        steady = Material.of(combined(base, learnt + moved.detach()))
+        losses = _regularizers(Learnt(material, steady, shown.shares, learnt, nearby), sample, run)
         if response.curvature is None:
             pull(radiance, response.gradient, losses)
         else:
@@ -292,7 +302,7 @@ def _residuals(
     residual: Residual, sample: Sample, options: DistillOptions, generator: torch.Generator
 ) -> tuple[Tensor, Tensor | None]:
     """What was learnt at a sample's points, (P, 5), and, for the smoothness loss, near them."""
-    if options.smoothness == 0:
+    if options.hold.smoothness == 0:
         return residual(sample.points), None
     moved = regularizers.displaced(sample.points, sample.normals, generator)
     here, nearby = residual(torch.cat([sample.points, moved])).chunk(2)
@@ -301,25 +311,29 @@ def _residuals(
 
 @dataclass(frozen=True)
 class Learnt:
-    """Of a sample's points: their material, the recipe's (P, 5), the residual's logits (P, 5), and those nearby."""
+    """Of a sample's points: their material, the same as the residual alone may change it, the coats' shares (P, K), the
+    residual's logits (P, 5), and those nearby."""
 
     material: Material
-    base: Tensor
+    steady: Material
+    shares: Tensor
     residual: Tensor
     nearby: Tensor | None
 
 
 def _regularizers(learnt: Learnt, sample: Sample, run: Run) -> list[Tensor]:
     """The weighted losses on the material itself."""
-    options = run.options
+    hold = run.options.hold
     losses = []
     if run.guidance.held:  # words decide what a picture leaves open; a known target needs no such help
         metallic = learnt.material.metallic
-        losses.append(options.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(metallic))
-        losses.append(options.anchor * regularizers.hold(learnt.residual))
-        losses.append(options.anchor * UNLIT * regularizers.baked_light(learnt.material, learnt.base, sample.transport.E))
+        losses.append(hold.bimodal * schedule.bimodal(run.progress) * regularizers.bimodality(metallic))
+        losses.append(hold.anchor * regularizers.hold(learnt.residual))
+        losses.append(hold.anchor * regularizers.SLOPE**2 * run.state.moves.hold())
+        even = run.state.moves.even(learnt.shares)
+        losses.append(hold.anchor * UNLIT * regularizers.baked_light(learnt.steady, even, sample.transport.E))
     if learnt.nearby is not None:
-        losses.append(options.smoothness * regularizers.smoothness(learnt.residual, learnt.nearby))
+        losses.append(hold.smoothness * regularizers.smoothness(learnt.residual, learnt.nearby))
     return losses
 
 
@@ -380,7 +394,7 @@ def _beside(out: Path, ending: str) -> Path:
 
 
 def _preview(run: Run) -> None:
-    write_preview(_beside(run.out, "preview.png"), run.views, run.base, run.state.residual)
+    write_preview(_beside(run.out, "preview.png"), run.views, run.base.moved(run.state.moves), run.state.residual)
 
 
 def _write(run: Run) -> None:
@@ -397,5 +411,5 @@ def _write(run: Run) -> None:
         "fov_y": views.fov_y,
         "size": np.array([views.width, views.height], np.int32),
     }
-    extra = {**request.extra, "recipe": run.base.recipe.to_json(), "residual": state.residual.config_dict()}
+    extra = {**request.extra, "recipe": state.moves.moved(run.base.recipe).to_json(), "residual": state.residual.config_dict()}
     save_npz(run.out, MATERIAL, arrays, Provenance(request.options, request.seed, request.inputs, extra))

@@ -26,13 +26,19 @@ SAMPLES = 96
 
 def evaluate(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Array:
     """Material of points: (P, 6), see `COLUMNS`. The recipe is settled (`masks.settled`)."""
+    return evaluate_coats(recipe, surface, pieces)[0]
+
+
+def evaluate_coats(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> tuple[Array, Array]:
+    """The same, and how much of each point is each coat's: (P, K), which sum to 1."""
     result = np.empty((len(surface), COLUMNS), np.float32)
+    shares = np.empty((len(surface), len(recipe.coats)), np.float32)
     uv, face = along(pieces, surface.piece, surface.point, surface.normal)
     for rows, around in _groups(face, pieces):
         part = surface[rows]
         world = Place(np.ascontiguousarray(part.point.T), uv[:, rows], face[rows], part.footprint, (around, 0, 0), recipe.seed)
-        result[rows] = layered(recipe, part, world, pieces)
-    return result
+        result[rows], shares[rows] = layered(recipe, part, world, pieces)
+    return result, shares
 
 
 def _groups(face, pieces: Pieces):  # type: ignore[no-untyped-def]
@@ -47,9 +53,11 @@ def _groups(face, pieces: Pieces):  # type: ignore[no-untyped-def]
         yield rows, 0.0
 
 
-def layered(recipe: Recipe, surface: Surface, world: Place, pieces: Pieces = WHOLE) -> Array:
-    """As `evaluate`, of points that share a period. Args: world: the same points in object sizes."""
+def layered(recipe: Recipe, surface: Surface, world: Place, pieces: Pieces = WHOLE) -> tuple[Array, Array]:
+    """As `evaluate_coats`, of points that share a period. Args: world: the same points in object sizes."""
     values = coated(recipe.base, surface, world, pieces, 0)
+    shares = np.zeros((len(values), len(recipe.coats)), np.float32)
+    shares[:, 0] = 1
     for number, layer in enumerate(recipe.layers, 1):
         cover = coverage(layer.masks, surface, world.seeded(number)) * np.float32(layer.strength)
         some = np.flatnonzero(cover > 0)
@@ -58,7 +66,9 @@ def layered(recipe: Recipe, surface: Surface, world: Place, pieces: Pieces = WHO
             relief = layer.strength**2 * over[:, 5]  # what lies thinly stands out little
             over[:, 5] = relief + 0.5 * values[some, 5] + layer.thickness / layer.coat.metres
             values[some] += (over - values[some]) * cover[some, None]
-    return values
+            shares[some] *= 1 - cover[some, None]
+            shares[some, number] = cover[some]
+    return values, shares
 
 
 def coated(coat: Coat, surface: Surface, world: Place, pieces: Pieces, number: int) -> Array:

@@ -41,7 +41,7 @@ def swatch(recipe: Recipe, size: int, threads: int, supersample: int = 2) -> Swa
         surface = Surface.bare(point, np.broadcast_to(np.array([0, 0, 1], np.float32), point.shape), 1 / count)
         p = np.ascontiguousarray(point.T)
         world = Place(p, p[:2], np.zeros(len(u), np.int32), surface.footprint, (1.0, 1.0, 0.0), recipe.seed)
-        values = layered(recipe, surface, world)
+        values, _ = layered(recipe, surface, world)
         maps[first : first + rows] = values.reshape(-1, supersample, size, supersample, COLUMNS).mean((1, 3))
 
     with ThreadPoolExecutor(threads) as pool:

@@ -206,8 +206,9 @@ def networks(device: torch.device) -> tuple[Any, Any, Any]:
 
 
 def _run(views: Views, guidance: StableDiffusionGuidance, options: DistillOptions, device: torch.device) -> Run:
-    state = new_state(options, views, device)
-    return Run(Path(), views, guidance, Base(guidance.recipe, views), options, BUDGET, Provenance({}, 0, {}), state, Clock())
+    base = Base(guidance.recipe, views)
+    state = new_state(options, views, device, base.recipe)
+    return Run(Path(), views, guidance, base, options, BUDGET, Provenance({}, 0, {}), state, Clock())
 
 
 def counted(residual: Residual, model: models.StableDiffusion, points: int, batch: int, size: int) -> dict[str, Cost]:

@@ -53,7 +53,7 @@ class Ground:
     normal: NDArray[np.float32]
     footprint: NDArray[np.float32]
     triangle: NDArray[np.int32]
-    barycentric: NDArray[np.float64]
+    barycentric: NDArray[np.float32]
 
     @staticmethod
     def of(prep: Path, conditions: Path, size: int) -> "Ground":
@@ -67,7 +67,7 @@ class Ground:
         chosen = np.random.default_rng(0).permutation(len(surface.triangle))[:TEXELS]
         some = surface[np.sort(chosen)]
         corners = mesh["vertices"][mesh["triangles"]]
-        weights = np.c_[some.barycentric, 1 - some.barycentric.sum(1)]
+        weights = np.c_[some.barycentric, 1 - some.barycentric.sum(1)].astype(np.float32)
         width = texel_size(corners, subject.layout)[some.triangle]
         point, normal = some.interpolate(corners), some.interpolate(mesh["normals"])
         return Ground(subject.scene, point, normal, width, some.triangle, weights)

@@ -24,7 +24,7 @@ from stages.core.color import log_correlation, reinhard, srgb_decode, srgb_encod
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
 from stages.core.shading import Material, shade
-from stages.distill.options import GIVEN, DistillOptions
+from stages.distill.options import GIVEN, DistillOptions, HoldOptions, ScoreOptions
 from stages.distill.stage import distill
 from stages.prep.options import PrepOptions
 from stages.prep.stage import prep
@@ -181,9 +181,10 @@ def carry_out(run: Run, out: Path, options: PriorReportOptions) -> Path:
     """Distill a run, unless that is there. Returns: material.npz."""
     made = out / "runs" / run.name / "material.npz"
     made.parent.mkdir(parents=True, exist_ok=True)
-    asked = DistillOptions(prompt=run.prompt.text, seed=run.seed, steps=options.steps, given=run.given, lights=run.lights)
+    chosen = ScoreOptions(given=run.given)
+    asked = DistillOptions(prompt=run.prompt.text, seed=run.seed, steps=options.steps, score=chosen, lights=run.lights)
     if run.alone:
-        asked = dataclasses.replace(asked, anchor=0.0)
+        asked = dataclasses.replace(asked, hold=HoldOptions(anchor=0.0))
     distill(out / "meshes" / run.mesh / "conditions", made, asked)
     return made
 

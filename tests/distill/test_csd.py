@@ -11,7 +11,7 @@ from stages.distill.guidance.csd import (
     distillation_score,
     posterior_score,
 )
-from stages.distill.options import DistillOptions
+from stages.distill.options import DistillOptions, ScoreOptions
 
 OWN = Weights(2.5, (0.0, 0.0), 0.5)
 
@@ -43,8 +43,8 @@ def test_posterior_score_vanishes_for_the_true_noise() -> None:
 def test_what_is_left_open_is_the_models_own_or_dreamfusions() -> None:
     assert chosen_weights(DistillOptions(), OWN) == OWN
     assert chosen_weights(DistillOptions(), CSD) == Weights(1.05, (1.0, 0.5), 0.0)
-    assert chosen_weights(DistillOptions(loss="sds"), OWN) == Weights(100.0, (0.0, 0.0), 1.0)
-    assert chosen_weights(DistillOptions(eta1=0.0, eta2=(0.2, 0.1)), CSD) == Weights(0.0, (0.2, 0.1), 0.0)
+    assert chosen_weights(DistillOptions(score=ScoreOptions(loss="sds")), OWN) == Weights(100.0, (0.0, 0.0), 1.0)
+    assert chosen_weights(DistillOptions(score=ScoreOptions(eta1=0.0, eta2=(0.2, 0.1))), CSD) == Weights(0.0, (0.2, 0.1), 0.0)
 
 
 def test_sds_is_dreamfusions_equation() -> None:

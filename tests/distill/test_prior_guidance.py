@@ -11,7 +11,7 @@ from torch import Tensor
 
 from stages.core.shading import Material, shade
 from stages.distill.guidance.prior import PriorGuidance
-from stages.distill.options import DistillOptions
+from stages.distill.options import DistillOptions, ScoreOptions
 from stages.distill.sampling import CropSampler
 from stages.distill.views import Views
 from stages.material.recipe import EVEN
@@ -55,8 +55,8 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
     return Views(write_conditions(tmp_path_factory.mktemp("prior") / "conditions"))
 
 
-def guidance(views: Views, colour: float, batch: int = 2, **options: Any) -> PriorGuidance:
-    chosen = DistillOptions(prompt="flat", negative_prompt="bad", batch=batch, **options)
+def guidance(views: Views, colour: float, batch: int = 2, **score: Any) -> PriorGuidance:
+    chosen = DistillOptions(prompt="flat", batch=batch, score=ScoreOptions(negative_prompt="bad", **score))
     sampler = CropSampler(views, SIZE, batch, torch.device("cpu"))
     return PriorGuidance(FlatPrior(colour), sampler, chosen, lambda: EVEN)  # type: ignore[arg-type]
 

@@ -23,7 +23,7 @@ from stages.distill import schedule
 from stages.distill.guidance import sd
 from stages.distill.guidance.sd import StableDiffusionGuidance
 from stages.distill.guidance.view_words import VIEW_WORDS, words_of
-from stages.distill.options import DistillOptions
+from stages.distill.options import DistillOptions, ScoreOptions
 from stages.distill.sampling import CropSampler, Sample
 from stages.distill.stage import distill
 from stages.distill.views import Views
@@ -61,7 +61,8 @@ def sources(folder: Path, **changes: Any) -> SdOptions:
 
 
 def guidance(model: StableDiffusion, views: Views, batch: int = 2, **options: Any) -> StableDiffusionGuidance:
-    chosen = DistillOptions(guidance="sd", prompt="oak", negative_prompt="bad", batch=batch, **options)
+    score = ScoreOptions(negative_prompt="bad", loss=options.pop("loss", "csd"), given=options.pop("given", "full"))
+    chosen = DistillOptions(guidance="sd", prompt="oak", batch=batch, score=score, **options)
     return StableDiffusionGuidance(model, CropSampler(views, sd.view_size(views, model.files), batch, CPU), chosen)
 
 

@@ -35,9 +35,9 @@ SDS = Weights(eta1=100.0, eta2=(0.0, 0.0), posterior=1.0)
 
 def chosen_weights(options: DistillOptions, own: Weights) -> Weights:
     """The weights that the options name; those they leave open are SDS, or for CSD the guidance's own."""
-    given = {name: getattr(options, name) for name in ("eta1", "eta2", "posterior")}
+    given = {name: getattr(options.score, name) for name in ("eta1", "eta2", "posterior")}
     given = {name: value for name, value in given.items() if value is not None}
-    return dataclasses.replace(SDS if options.loss == "sds" else own, **given)
+    return dataclasses.replace(SDS if options.score.loss == "sds" else own, **given)
 
 
 def distillation_score(

@@ -24,7 +24,8 @@ from stages.material.recipe import Recipe
 from stages.prior.model import Prior
 from stages.prior.text import TextEmbedding
 
-BUDGET = Budget(steps=250, learning_rate=0.01)
+BUDGET = Budget(steps=60, learning_rate=0.01)
+"""As many as pay: 250 leave colour, roughness, baked light and relit pictures where 60 have brought them."""
 
 OWN = Weights(eta1=0.5, eta2=(0.0, 0.0), posterior=1.0)
 """What `--loss csd` means for this model: mostly its posterior mean, which stays where it belongs. The classifier's score by
@@ -51,7 +52,7 @@ class PriorGuidance:
         self.budget, self.weights = BUDGET, chosen_weights(options, OWN)
         self._prior, self._options = prior, options
         self._positive = {words: prior.embed([f"{options.prompt}, {words}"]) for words in VIEW_WORDS}
-        self._null, self._negative = prior.embed([""]), prior.embed([options.negative_prompt])
+        self._null, self._negative = prior.embed([""]), prior.embed([options.score.negative_prompt])
 
     @functools.cached_property
     def recipe(self) -> Recipe:
@@ -60,7 +61,7 @@ class PriorGuidance:
 
     def draw(self, generator: torch.Generator) -> Sample:
         """See `Guidance.draw`."""
-        sample, given = self.sampler.draw(generator), self._options.given
+        sample, given = self.sampler.draw(generator), self._options.score.given
         assert sample.images is not None
         exposure, conditions = self._conditions(sample.images, sample)
         if given != "full":

@@ -52,9 +52,9 @@ class StableDiffusionGuidance:
         self.inputs: dict[str, str] = model.hashes
         self.recipe, self.held = EVEN, False
         self.budget, self.weights = BUDGET, chosen_weights(options, CSD)
-        self._model, self._given = model, options.given
+        self._model, self._given = model, options.score.given
         prompts = [f"{options.prompt}, {words}" for words in VIEW_WORDS]
-        self._text = model.embed([*prompts, "", options.negative_prompt])  # (6, T, D)
+        self._text = model.embed([*prompts, "", options.score.negative_prompt])  # (6, T, D)
 
     def draw(self, generator: torch.Generator) -> Sample:
         """See `Guidance.draw`."""
