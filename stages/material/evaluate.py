@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from stages.core.color import srgb_decode
-from stages.material.directions import FIRST_ROUND, WHOLE, Pieces, along
+from stages.material.directions import WHOLE, Pieces, along
 from stages.material.look import Look, from_oklab, to_oklab
 from stages.material.masks import coverage
 from stages.material.place import Place
@@ -42,13 +42,17 @@ def evaluate_coats(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> 
 
 
 def _groups(face, pieces: Pieces):  # type: ignore[no-untyped-def]
-    """Points that share a period: those of each round piece's wall, and all others. Yields (rows, way around)."""
-    kind, piece = face % 16, face // 16
+    """Points that share a period: those of each round piece, and all others. Yields (rows, way around).
+
+    Its floor and ceiling have the period of its wall, though they are narrower: what is solid then runs on from one to the
+    other.
+    """
+    piece = face // 16
     for k in np.flatnonzero(pieces.radius > 0):
-        rows = np.flatnonzero((kind == FIRST_ROUND) & (piece == k))
+        rows = np.flatnonzero(piece == k)
         if len(rows):
             yield rows, float(2 * np.pi * pieces.radius[k])
-    rows = np.flatnonzero(kind != FIRST_ROUND)
+    rows = np.flatnonzero(pieces.radius[piece] == 0)
     if len(rows):
         yield rows, 0.0
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stages.material.directions import FIRST_ROUND, WHOLE, along, measure
+from stages.material.directions import FIRST_ROUND, FLOOR, WHOLE, along, measure
 from stages.material.evaluate import COLUMNS, evaluate
 from stages.material.masks import settled
 from stages.material.recipe import Coat, Layer, Mask, Recipe
@@ -132,6 +132,21 @@ def test_bricks_close_around_a_tower() -> None:
         surface = Surface.bare((0.25 * n + np.stack([0 * z, 0 * z, z], 1)).astype(np.float32), n, 1e-3)
         sides.append(evaluate(Recipe(Coat("brick", metres=3.0)), surface, pieces)[:, 0])
     assert np.corrcoef(*sides)[0, 1] > 0.95
+
+
+@pytest.mark.parametrize("look", ["rust", "marble"])
+def test_what_is_solid_runs_on_from_the_wall_of_a_round_thing_to_its_top(look: str) -> None:
+    """Points of a sphere just below and just above the circle where its wall ends."""
+    dice = np.random.default_rng(0).normal(size=(4000, 3))
+    normal = (dice / np.linalg.norm(dice, axis=1, keepdims=True)).astype(np.float32)
+    pieces, _ = measure(0.5 * normal, normal, np.ones(4000, np.float32), np.zeros(4000, np.int64))
+    assert pieces.radius[0] > 0
+    angle, sides = np.linspace(0, 6.2, 300), []
+    for rise in (FLOOR - 1e-4, FLOOR + 1e-4):
+        level = np.sqrt(1 - rise**2)
+        n = np.stack([level * np.cos(angle), level * np.sin(angle), np.full_like(angle, rise)], 1).astype(np.float32)
+        sides.append(evaluate(Recipe(Coat(look, metres=1.0)), Surface.bare(0.5 * n, n, 2e-3), pieces)[:, 0])
+    assert np.corrcoef(*sides)[0, 1] > 0.98
 
 
 def test_a_survey_finds_edges_creases_and_what_is_hidden() -> None:

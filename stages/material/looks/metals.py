@@ -133,17 +133,17 @@ def machined(at: Place, kind: Metal) -> Look:
 
 def galvanised(at: Place, kind: Metal = METALS["aluminium"]) -> Look:
     """Zinc spangle: flat crystals some centimetres wide, each with its own sheen and fern-like growth."""
-    spangle = cells(warped(at, 0.003, 0.012, 1, 3), 0.02, 2, 1.0)
+    spangle = cells(warped(at, 0.0009, 0.006, 1, 3), 0.022, 2, 1.0)
     show = fading(0.02, at.footprint)
     own = spangle.random(1) - 0.5
     angle = spangle.random(2) * np.float32(6.2832)
     along = spangle.offset[0] * np.cos(angle) + spangle.offset[1] * np.sin(angle)
     fern = fbm(at.moved(np.stack([along, along, 0 * along])), Spectrum(0.004, 0.0005, 0.9, patch=0.4), 3)
     fine = fbm(at, Spectrum(0.002, 0.0003, 1.15, tails=0.3), 4)
-    bloom = masked(at, Spectrum(0.1, 0.001, 0.9, patch=0.5), 0.12, 5, 0.3)
-    color = palette(0.5 + 0.75 * own * show + 0.14 * fern + 0.08 * fine, "#8e9499", "#a9afb3", "#bfc5c8", "#d3d8da")
+    bloom = masked(at, Spectrum(0.1, 0.001, 0.9, patch=0.5), 0.04, 5, 0.3)
+    color = palette(0.5 + 1.0 * own * show + 0.12 * fern + 0.06 * fine, "#8e9499", "#a9afb3", "#bfc5c8", "#d3d8da")
     color = mix(shade(color, 0.05 * fine), palette(fine, "#d9dcdc", "#e6e8e8"), 0.5 * bloom)
-    rough = 0.42 - 0.16 * own * show + 0.05 * fern + 0.03 * fine + 0.25 * bloom
+    rough = 0.38 - 0.24 * own * show + 0.05 * fern + 0.03 * fine + 0.25 * bloom
     return Look(color, np.clip(rough, 0.1, 1), 1.0 - 0.7 * bloom, 2e-5 * own * show + 4e-6 * fern)
 
 

@@ -272,7 +272,7 @@ def velvet(at: Place) -> Look:
         0.42 + 0.22 * turned + 0.13 * tip, 0.13 * lost(flat, spectrum), "#3a0812", "#5a0d1c", "#7d1428", "#a62e40", "#c55a66"
     )
     color = tint(shade(color, 0.05 * tip), 0.06 * comb)
-    return Look(color, np.clip(0.72 - 0.08 * turned + 0.05 * tip, 0, 1), 0.0, 3e-4 * nap + 5e-5 * comb + 5e-5 * tip)
+    return Look(color, np.clip(0.72 - 0.08 * turned + 0.05 * tip, 0, 1), 0.0, 3e-4 * nap + 1.5e-5 * comb + 8e-6 * tip)
 
 
 def pile(at: Place, size: float, stops: tuple[str, ...], seed: int, depth: float) -> tuple[Array, Array, Array, Array]:
