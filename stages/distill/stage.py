@@ -109,7 +109,7 @@ def _distill(
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
         run = Run(out, views, guidance, base, options, budget, request, state, clock)
-        for line in parts(guidance.recipe) if guidance.recipe != EVEN else ():
+        for line in parts(base.recipe) if guidance.recipe != EVEN else ():
             tell(line)
         if not resumed:
             _preview(run)  # what the words alone give

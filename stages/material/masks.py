@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.material.directions import WHOLE, Pieces, along
+from stages.material.parts import found
 from stages.material.patterns import Spectrum, cells, edge, exceeds, fbm, lost, noise, spots, warped
 from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
@@ -17,7 +18,7 @@ from stages.material.surface import Array, Surface
 SIDES = ("below", "above", "front", "back", "left", "right", "fade")
 """Kinds that cover a share of the extent, not of the surface."""
 
-DISTANCES = (*SIDES, "stripes", "bands", "spots", "checks", "veins")
+DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "spots", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
 
 LEAST = {"edges": 0.08, "crevices": 0.08, "hidden": 0.06}
@@ -71,6 +72,10 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
     x, y, z = at.p
     if mask.kind in SIDES:
         return {"below": -z, "above": z, "fade": z, "front": x, "back": -x, "left": y, "right": -y}[mask.kind]
+    if mask.kind == "along":
+        return surface.point @ np.array(mask.axis, np.float32)
+    if mask.kind == "pieces":
+        return np.isin(surface.piece, mask.pieces).astype(np.float32)
     if mask.kind in ("edges", "crevices"):
         return surface.convexity if mask.kind == "edges" else np.maximum(-surface.convexity, 0.8 * surface.occlusion - 0.2)
     if mask.kind in ("up", "down"):
@@ -124,6 +129,8 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
     def settle(mask: Mask, place: Place) -> Mask:
         if mask.kind == "all" or mask.level is not None:
             return mask
+        if mask.kind in SIDES and mask.said and (part := found(mask, surface)):
+            return part
         value = signal(mask, surface, place)
         if mask.kind in SIDES:  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())

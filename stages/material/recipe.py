@@ -8,7 +8,7 @@ from typing import Any
 
 KINDS = (
     "all", "below", "above", "front", "back", "left", "right", "fade", "edges", "crevices", "up", "down", "hidden",
-    "spots", "stripes", "bands", "checks", "veins", "patches", "streaks", "scratches", "chips",
+    "spots", "stripes", "bands", "checks", "veins", "patches", "streaks", "scratches", "chips", "pieces", "along",
 )  # fmt: skip
 """Ways to say where a layer lies; see `masks.py`."""
 
@@ -39,7 +39,7 @@ class Mask:
     """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the extent for heights and sides. size: of its
     shapes or of its border's noise, as a share of the object. wear: 0 a border as sharp as paint … 1 a ragged one. invert:
     everywhere else. level: threshold of what the mask is made of, once settled; None before. said: the word that asked for
-    it, for people. """
+    it, for people. pieces: rows of the survey's, of kind "pieces"; axis: a direction, of kind "along". """
 
     kind: str = "all"
     share: float = 0.3
@@ -48,6 +48,8 @@ class Mask:
     invert: bool = False
     level: float | None = None
     said: str = ""
+    pieces: tuple[int, ...] = ()
+    axis: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class Recipe:
     def from_json(data: dict[str, Any]) -> "Recipe":
         """Of what `to_json` gave. Raises: KeyError, TypeError where it is something else."""
         layers = tuple(
-            Layer(_coat(raw["coat"]), tuple(Mask(**mask) for mask in raw["masks"]), raw["thickness"], raw["strength"])
+            Layer(_coat(raw["coat"]), tuple(map(_mask, raw["masks"])), raw["thickness"], raw["strength"])
             for raw in data["layers"]
         )
         return Recipe(_coat(data["base"]), layers, data["seed"])
@@ -97,6 +99,10 @@ class Recipe:
     def coats(self) -> tuple[Coat, ...]:
         """The base's and each layer's."""
         return (self.base, *(layer.coat for layer in self.layers))
+
+
+def _mask(data: dict[str, Any]) -> Mask:
+    return Mask(**{**data, **{name: tuple(data.get(name, ())) for name in ("pieces", "axis")}})
 
 
 def _coat(data: dict[str, Any]) -> Coat:

@@ -13,7 +13,7 @@ PLACES = {
     "bands": "bands, {}",
     "checks": "checks, {}", "veins": "veins, {}", "patches": "patches, {}", "streaks": "streaks, {}",
     "scratches": "scratches, {}",
-    "chips": "chips, {}",
+    "chips": "chips, {}", "pieces": "pieces of their own", "along": "by its shape",
 }  # fmt: skip
 """Kind of a mask → where it is, with its share."""
 

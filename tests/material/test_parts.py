@@ -1,0 +1,107 @@
+"""Named parts are found where they are: legs, handles, blades, and nothing where the shape shows none."""
+
+import numpy as np
+import pytest
+
+from stages.material.directions import Pieces
+from stages.material.masks import coverage, settled
+from stages.material.parts import found
+from stages.material.place import Place
+from stages.material.recipe import Coat, Layer, Mask, Recipe
+from stages.material.surface import Surface
+
+RNG = np.random.default_rng(0)
+
+
+def box(low: tuple[float, ...], high: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Points spread evenly over a box, and their normals."""
+    low_, size = np.array(low), np.array(high) - np.array(low)
+    points, normals = [], []
+    for axis in range(3):
+        for side in (0.0, 1.0):
+            area = np.delete(size, axis).prod()
+            p = RNG.random((max(4, int(40000 * area)), 3))
+            p[:, axis] = side
+            points.append(low_ + p * size)
+            normals.append(np.broadcast_to(np.eye(3)[axis] * (2 * side - 1), p.shape))
+    return np.concatenate(points), np.concatenate(normals)
+
+
+def tube(radius: float, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+    """An upright cylinder without ends."""
+    count = int(12000 * 2 * np.pi * radius * (high - low))
+    angle = RNG.random(count) * 2 * np.pi
+    normal = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
+    return normal * radius + np.stack([0 * angle, 0 * angle, RNG.uniform(low, high, count)], 1), normal
+
+
+def ring(centre: tuple[float, ...], large: float, small: float) -> tuple[np.ndarray, np.ndarray]:
+    """A torus that stands upright in the plane of x and z."""
+    a, b = RNG.random((2, 4000)) * 2 * np.pi
+    normal = np.stack([np.cos(a) * np.cos(b), np.sin(b), np.sin(a) * np.cos(b)], 1)
+    return np.array(centre) + large * np.stack([np.cos(a), 0 * a, np.sin(a)], 1) + small * normal, normal
+
+
+def surface(*pieces: tuple[np.ndarray, np.ndarray], apart: bool = False) -> Surface:
+    point = np.concatenate([p for p, _ in pieces]).astype(np.float32)
+    normal = np.concatenate([n for _, n in pieces]).astype(np.float32)
+    number = np.concatenate([np.full(len(p), k if apart else 0, np.int32) for k, (p, _) in enumerate(pieces, 1)])
+    zero = np.zeros(len(point), np.float32)
+    return Surface(point, normal, zero + np.float32(1e-3), zero, zero, number)
+
+
+LEGS = [box((x, y, -0.5), (x + 0.04, y + 0.04, 0.2)) for x in (-0.3, 0.26) for y in (-0.3, 0.26)]
+TABLE = [*LEGS, box((-0.32, -0.32, 0.2), (0.32, 0.32, 0.25))]
+SWORD = [box((-0.012, -0.012, -0.5), (0.012, 0.012, -0.3)), box((-0.02, -0.1, -0.3), (0.02, 0.1, -0.27)),
+         box((-0.004, -0.025, -0.27), (0.004, 0.025, 0.5))]  # fmt: skip
+HAMMER = [box((-0.015, -0.015, -0.5), (0.015, 0.015, 0.4)), box((-0.04, -0.15, 0.38), (0.04, 0.15, 0.48))]
+MUG = [tube(0.25, -0.3, 0.3), ring((0.25, 0, 0), 0.15, 0.03)]
+
+
+PIECES = Pieces(
+    np.zeros((6, 3), np.float32), np.repeat(np.eye(3, dtype=np.float32)[None], 6, 0), np.zeros(6, np.float32),
+    np.repeat(np.array([[0, 0, 1]], np.float32), 6, 0),
+)  # fmt: skip
+
+
+def covered(surface_: Surface, word: str, *, region: str = "below") -> np.ndarray:
+    """Share of each point that a part covers."""
+    layer = Layer(Coat("oak"), (Mask(region, 0.3, 0.05, 0.0, said=word),))
+    recipe = settled(Recipe(Coat("steel"), (layer,)), surface_, PIECES)
+    place = Place(np.ascontiguousarray(surface_.point.T), surface_.point.T[:2].copy(), surface_.piece, surface_.footprint)
+    return coverage(recipe.layers[0].masks, surface_, place)
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_legs_end_where_the_top_begins(apart: bool) -> None:
+    table = surface(*TABLE, apart=apart)
+    cover, leg = covered(table, "legs") > 0.5, table.point[:, 2] < 0.199
+    assert (cover == leg).mean() > 0.97
+    assert (covered(table, "with the legs") == covered(table, "legs")).all()
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]), np.diag([1, -1, -1])])
+@pytest.mark.parametrize(("thing", "handle_below"), [(SWORD, -0.3), (HAMMER, 0.37)])
+def test_handles_of_long_things_are_found_however_they_lie(thing: list, handle_below: float, turn: np.ndarray) -> None:
+    one = surface(*thing)
+    handle = one.point[:, 2] < handle_below
+    turned = Surface(one.point @ turn.T.astype(np.float32), one.normal @ turn.T.astype(np.float32), one.footprint,
+                     one.convexity, one.occlusion, one.piece)  # fmt: skip
+    assert ((covered(turned, "handle") > 0.5) == handle).mean() > 0.93
+    other = covered(turned, "blade" if thing is SWORD else "head", region="above") > 0.5
+    assert (other != handle).mean() > 0.93
+
+
+def test_a_mugs_handle_is_at_its_side() -> None:
+    mug = surface(*MUG)
+    cover = covered(mug, "on its handle") > 0.5
+    ringed = np.hypot(mug.point[:, 0], mug.point[:, 1]) > 0.27
+    assert (cover == ringed).mean() > 0.95 and cover.mean() < 0.3
+
+
+def test_what_the_shape_does_not_show_lies_where_words_put_it() -> None:
+    crate = surface(box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)))
+    for word in ("legs", "handle", "blade", "spout", "sole"):
+        assert found(Mask("below", 0.3, said=word), crate) is None
+    assert covered(crate, "handle").mean() == pytest.approx((crate.point[:, 2] < -0.2).mean(), abs=0.02)
+    assert found(Mask("below", 0.3, said="handle"), Surface.bare(crate.point[:50], crate.normal[:50], 1e-3)) is None
