@@ -18,8 +18,8 @@ from stages.material.residual import MARGIN
 BOUND = 0.3
 """Most that a logit of colour or roughness moves, and the logarithm of contrast: 0.07 of a value of 0.5, a factor of 1.35."""
 
-PACE = 0.3
-"""Logits for one unit of a parameter: the optimiser's steps, which fit the residual, would throw so few numbers about."""
+PACE = 1.5
+"""Logits for one unit of a parameter: so few numbers, of which every picture speaks, may go faster than the residual."""
 
 COLUMNS = 5
 """Logits of red, green, blue and roughness; logarithm of contrast."""

@@ -39,6 +39,9 @@ TEXTURE = 512
 PREVIEW = 128
 """Pixels of a view's picture in the preview of `distill`."""
 
+ALONE_STEPS, ALONE_RATE = 250, 0.01
+"""Of the ladder's runs, in which the model is to show what it would do by itself."""
+
 REGION = 0.25
 """The upper and the lower region of a composition leave out this share of the height on either side of the middle."""
 
@@ -184,7 +187,8 @@ def carry_out(run: Run, out: Path, options: PriorReportOptions) -> Path:
     chosen = ScoreOptions(given=run.given)
     asked = DistillOptions(prompt=run.prompt.text, seed=run.seed, steps=options.steps, score=chosen, lights=run.lights)
     if run.alone:
-        asked = dataclasses.replace(asked, hold=HoldOptions(anchor=0.0))
+        steps = options.steps or ALONE_STEPS
+        asked = dataclasses.replace(asked, hold=HoldOptions(anchor=0.0), steps=steps, learning_rate=ALONE_RATE)
     distill(out / "meshes" / run.mesh / "conditions", made, asked)
     return made
 
