@@ -50,6 +50,9 @@ def explain_words(common: Common, options: DistillOptions) -> None:
 @click.argument("conditions", type=INPUT, metavar="CONDITIONS")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="MATERIAL.npz", help="The file to write.")
 @click.option("--prompt", default=DEFAULT["prompt"], metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
+@click.option("--like", type=INPUT, default=DEFAULT["like"], metavar="OTHER.npz",
+              help="In place of --prompt: another mesh's material, whose words, recipe and draw are taken over, as large in "
+                   "space as there: by --object-size, or else by the two meshes' own units.")
 @click.option("--object-size", type=click.FloatRange(1e-3, 1e4), default=DEFAULT["object_size"], metavar="METRES",
               help="Length of its longest edge, which sizes bricks, grain and threads.  [default: what the words say]")
 @click.option("--explain", is_flag=True, help="Print what is understood of --prompt as a table, and stop.")

@@ -94,7 +94,7 @@ MATERIAL = Schema(
         "size": Field("i4", (2,)),  # width, height of those views
     },
     # recipe: as `material.recipe` writes it; residual: ResidualConfig as a dict; prompt; guidance: name and what identifies its
-    # model; environments: names used
+    # model; environments: names used; extent: longest edge of the object in units of its source
     extra=("recipe", "residual", "prompt", "guidance", "environments"),
 )
 

@@ -24,6 +24,7 @@ class ScoreOptions:
     eta2: tuple[float, float] | None = None  # of the negative one, at the start and from two thirds on; None: likewise
     posterior: float | None = None  # share of (eps_pos - noise) added to the classifier score; None: likewise
     given: str = "full"  # conditions the model gets: one of GIVEN; the paper's ablations
+    lights: str = "all"  # environments that steps are lit by: "all", or "one", the first; likewise
 
 
 @dataclass(frozen=True)
@@ -48,9 +49,9 @@ class DistillOptions:
     seed: int = 0  # *
     device: str = "cpu"  # * a torch device
     prompt: str = ""  # what the object is made of
+    like: Path | None = None  # material.npz whose prompt, recipe and draw are taken over, at the same physical scale
     object_size: float | None = None  # metres, longest edge; None: what the prompt's words say
     library: Path | None = None  # folder of scanned materials, which are preferred
     score: ScoreOptions = field(default_factory=ScoreOptions)
     hold: HoldOptions = field(default_factory=HoldOptions)
-    lights: str = "all"  # environments that steps are lit by: "all", or "one", the first
     sd: SdOptions = field(default_factory=SdOptions)  # models and memory of Stable Diffusion

@@ -25,6 +25,7 @@ from stages.distill.checkpoint import State, step_generator
 from stages.distill.gauss_newton import logit_gradient, proposal
 from stages.distill.guidance.base import Budget, Guidance, Response
 from stages.distill.leaps import UNTIL, leaps
+from stages.distill.like import Like, read_like
 from stages.distill.moves import Moves, told
 from stages.distill.optimizer import RowAdam
 from stages.distill.options import QUALITY, DistillOptions
@@ -96,10 +97,12 @@ def _distill(
     conditions: Path, out: Path, options: DistillOptions, force: bool, progress: Progress, tell: Tell
 ) -> DistillResult:
     device = chosen_device(options)
+    like = None if options.like is None else read_like(options.like, options)
+    options = options if like is None else dataclasses.replace(options, prompt=like.prompt)
     views = Views(conditions)
-    guidance = make_guidance(options, views, device)
+    guidance = make_guidance(options, views, device, like)
     budget = chosen_budget(options, guidance.budget)
-    request = _request(options, budget, views, guidance)
+    request = _request(options, budget, views, guidance, like)
     if not force and (done := peek(out, MATERIAL)) and done.same_request(request):
         checkpoint.checkpoint_path(out).unlink(missing_ok=True)
         return DistillResult(budget.steps, 0, math.nan, True)
@@ -144,8 +147,8 @@ def chosen_budget(options: DistillOptions, called_for: Budget) -> Budget:
     return Budget(steps, options.learning_rate or called_for.learning_rate)
 
 
-def make_guidance(options: DistillOptions, views: Views, device: torch.device) -> Guidance:
-    """The guidance that the options name. Raises: InputError, ArtifactError."""
+def make_guidance(options: DistillOptions, views: Views, device: torch.device, like: Like | None = None) -> Guidance:
+    """The guidance that the options name. Args: like: whose recipe it begins with. Raises: InputError, ArtifactError."""
     if options.guidance == "reference":
         from stages.distill.guidance import reference
         from stages.light.textured_model import TexturedModel
@@ -169,14 +172,17 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device) -
     from stages.prior.prompt import read_prompt
 
     model = load_prior(device)
-    sampler = CropSampler(views, model.size, options.batch, device, options.lights)
+    sampler = CropSampler(views, model.size, options.batch, device, options.score.lights)
 
     library = Library(options.library) if options.library else None
-    recipe = read_prompt(options.prompt, model, options.seed, options.object_size, library)
+    if like is None:
+        recipe = read_prompt(options.prompt, model, options.seed, options.object_size, library)
+    else:
+        recipe = like.carried(views.extent(), options.object_size)
     scans = library.used({coat.look for coat in recipe.coats}) if library else {}
 
     def begin() -> Recipe:
-        return least_like_light(recipe, views, step_generator(options.seed, POOL))
+        return recipe if like is not None else least_like_light(recipe, views, step_generator(options.seed, POOL))
 
     guidance = prior.PriorGuidance(model, sampler, options, begin)
     if scans:
@@ -190,7 +196,7 @@ def _stable_diffusion(options: DistillOptions, views: Views, device: torch.devic
     from stages.sd import files, memory, models
 
     found = files.find_models(options.sd)
-    sampler = CropSampler(views, sd.view_size(views, found), options.batch, device, options.lights)
+    sampler = CropSampler(views, sd.view_size(views, found), options.batch, device, options.score.lights)
     model = models.load_models(found, device, memory.plan(options.sd.vram, device))
     return sd.StableDiffusionGuidance(model, sampler, options)
 
@@ -378,13 +384,15 @@ def chosen_device(options: DistillOptions) -> torch.device:
     return device
 
 
-def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Guidance) -> Provenance:
+def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Guidance, like: Like | None) -> Provenance:
     chosen = plain_options(options) | dataclasses.asdict(budget)
     if guidance.weights:
         chosen |= plain_options(guidance.weights)
     chosen["reference"] = options.reference.name if options.reference else None
-    del chosen["sd"], chosen["quality"], chosen["library"]  # its models are known by their hashes, and it by its steps
+    for known in ("sd", "quality", "library", "like"):  # by the hashes of their files, or by the steps
+        del chosen[known]
     inputs = {"conditions": views.digest, "prep": views.prep, **guidance.inputs}
+    inputs |= {} if like is None else {"like": like.digest}
     extra = {"prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments}
     return Provenance(chosen, options.seed, inputs, extra)
 
@@ -412,4 +420,5 @@ def _write(run: Run) -> None:
         "size": np.array([views.width, views.height], np.int32),
     }
     extra = {**request.extra, "recipe": state.moves.moved(run.base.recipe).to_json(), "residual": state.residual.config_dict()}
+    extra["extent"] = views.extent()
     save_npz(run.out, MATERIAL, arrays, Provenance(request.options, request.seed, request.inputs, extra))

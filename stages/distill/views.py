@@ -91,6 +91,10 @@ class Views:
         self._cache = _Cache(self.read_transport, cache_bytes, 2 * WIDTH)
         self._maps = _Cache(self._read_maps, cache_bytes // 2, 2 * 3 * len(LIGHT_MAPS))
 
+    def extent(self) -> float:
+        """Longest edge of the object, in the units of its source."""
+        return float(1 / np.cbrt(abs(np.linalg.det(self.to_world[:3, :3]))))
+
     def pixels(self, view: int) -> NDArray[np.int32]:
         """Flat index in the image of each object pixel of a view, ascending (P,)."""
         return self._geometry[view].pixels

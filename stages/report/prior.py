@@ -184,8 +184,8 @@ def carry_out(run: Run, out: Path, options: PriorReportOptions) -> Path:
     """Distill a run, unless that is there. Returns: material.npz."""
     made = out / "runs" / run.name / "material.npz"
     made.parent.mkdir(parents=True, exist_ok=True)
-    chosen = ScoreOptions(given=run.given)
-    asked = DistillOptions(prompt=run.prompt.text, seed=run.seed, steps=options.steps, score=chosen, lights=run.lights)
+    chosen = ScoreOptions(given=run.given, lights=run.lights)
+    asked = DistillOptions(prompt=run.prompt.text, seed=run.seed, steps=options.steps, score=chosen)
     if run.alone:
         steps = options.steps or ALONE_STEPS
         asked = dataclasses.replace(asked, hold=HoldOptions(anchor=0.0), steps=steps, learning_rate=ALONE_RATE)

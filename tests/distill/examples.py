@@ -57,8 +57,8 @@ def gradient_light(name: str, n: NDArray, wo: NDArray) -> Transport:
     return Transport(E, light * albedo[..., :1], light * albedo[..., 1:], torch.from_numpy(cosine).float())
 
 
-def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str = "gltf") -> Path:
-    """Write the folder; four cameras or more on a ring, alternately above and below.
+def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str = "gltf", extent: float = 1.0) -> Path:
+    """Write the folder; four cameras or more on a ring, alternately above and below. extent: of the sphere in its source.
 
     The light maps of the profile sd are twice as bright as glTF's, and its normals point to the viewer.
     """
@@ -84,8 +84,8 @@ def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str 
             write_geometry(folder, view, dataclasses.replace(geometry, normal=towards), SD)
         folders = [view_folder(view), *([f"{view_folder(view)}/{SD}"] if profile == SD else [])]
         files += [f"{place}/{name}.exr" for place in folders for name in ("geometry", *LIGHTS)]
-    extra = {"environments": list(LIGHTS), "views": views, "knots": list(KNOTS), "clamped": {}, "to_world": identity()}
-    extra["profile"] = profile
+    extra = {"environments": list(LIGHTS), "views": views, "knots": list(KNOTS), "clamped": {}, "profile": profile}
+    extra["to_world"] = [x / extent for x in identity()[:-1]] + [1.0]
     write_manifest(folder, CONDITIONS, Provenance(made.options, 0, made.inputs, extra), files)
     return folder
 
