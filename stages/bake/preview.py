@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import OpenImageIO as oiio
-import torch
 from numpy.typing import NDArray
 
 from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
@@ -19,22 +18,22 @@ from stages.core.frames import camera_rays
 from stages.core.images import labelled
 from stages.core.parallel import in_parallel
 from stages.core.progress import Progress
-from stages.core.shading import Material, shade
 from stages.core.tiles import repeats
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer, facing, surface_points
+from stages.light.known import reflected
 from stages.light.lights import preview_light
 from stages.light.lookup import CLAMP, REPEAT, look_up
 from stages.light.scene import Hits, Scene
-from stages.light.transport import Quality, cached_light_set, light_transport
+from stages.light.transport import Quality, cached_light_set
 
 MAP_BACKDROP = (0.16, 0.18, 0.22)
 """Encoded background of the maps: slightly blue, so that no grey value is lost in it."""
 
-RAYS = Quality(lobe=24, light=8, extra=False)
+RAYS = Quality(lobe=16, light=6, extra=False)
 """Rays that a point traces, a quarter of its pixel."""
 
-TILE, MARGIN = 320, 16
+TILE, MARGIN = 640, 16
 """Points along an edge that are traced at once, which bounds memory, and how many around them know of each other's noise."""
 
 STRETCH = 4.0
@@ -148,8 +147,7 @@ def _draw(look: Look, light: Environment, directions: NDArray, c2w: NDArray, ste
         values = look.material(points, across)
         alpha[mask], material[mask] = 1, values
         values[:, 3] = rougher(values[:, 3], spread)
-        transport = light_transport(look.scene, points, [light], RAYS, seed=0)[0]
-        color[mask] = shade(transport, Material.of(torch.from_numpy(values))).numpy()
+        color[mask] = reflected(look.scene, points, light, values, RAYS, seed=0)
         if look.scene.emission is not None:
             color[mask] += look.scene.emission.at(points.triangle, points.barycentric, across)
         color *= np.float32(EXPOSURE)

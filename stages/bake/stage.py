@@ -25,7 +25,7 @@ from stages.bake.raster import Layout, Surface, touched_texels
 from stages.bake.relief import relief_normals
 from stages.bake.studio import write_studio
 from stages.bake.texels import Texels
-from stages.bake.visibility import Views, is_open, patches, seen_elsewhere, seen_points
+from stages.bake.visibility import Patches, Views, is_open, patches, seen_elsewhere, seen_points
 from stages.core.artifact import (
     Artifact,
     Provenance,
@@ -162,8 +162,9 @@ def bake_maps(
     mesh = subject.mesh
     texels = Texels(learnt, mesh["vertices"][mesh["triangles"]], mesh["normals"], subject.layout, subject.touched)
     residual = texels.residual()
-    unseen = mend_unseen(subject, views_of(made), residual, progress)
-    maps = texels.recipe(options.supersample, progress)
+    groups = patches(subject.touched, mesh["charts"])
+    unseen = mend_unseen(subject, groups, views_of(made), residual, progress)
+    maps = texels.recipe(options.supersample, groups, progress)
     values = combined(*(torch.from_numpy(a[on_chart]) for a in (maps[..., :5], residual)))
     maps[on_chart, :5] = values.numpy()
     charts, rays = mesh["charts"], options.occlusion_rays
@@ -193,17 +194,19 @@ def shown_scene(subject: Subject, maps: Maps) -> Scene:
     return subject.scene if maps.normal is None else subject.scene.bumped(baked_bumps(subject.mesh, maps.normal))
 
 
-def mend_unseen(subject: Subject, views: Views, residual: NDArray[np.float32], progress: Progress) -> float:
+def mend_unseen(
+    subject: Subject, groups: Patches, views: Views, residual: NDArray[np.float32], progress: Progress
+) -> float:
     """Fill, in place, what was learnt at texels that no view saw from seen surface nearby; all stay when none was seen.
 
     Args:
-        residual: (H, W, 5).
+        groups: the texels, by which sight is decided. residual: (H, W, 5).
     Returns:
         the share of texels on charts that no view saw.
     """
     progress("visibility", 0, 1)
     on_chart = subject.touched.triangle >= 0
-    surface, groups = subject.touched.where(on_chart), patches(subject.touched, subject.mesh["charts"])
+    surface = subject.touched.where(on_chart)
     first = surface[groups.first]
     seen = seen_points(subject.scene, first, views, subject.open)
     if subject.mesh.provenance.extra["shared_texels"]:

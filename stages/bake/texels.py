@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from stages.bake.evaluate import evaluate as evaluate_residual
 from stages.bake.raster import Layout, Surface, bands, covered_samples
+from stages.bake.visibility import Patches
 from stages.core.parallel import compiled, in_parallel
 from stages.core.progress import Progress
 from stages.material import surface as material_surface
@@ -46,13 +47,13 @@ class Texels:
         values[on_chart] = evaluate_residual(self._made.residual, self._touched.where(on_chart).interpolate(self._corners))
         return values
 
-    def recipe(self, supersample: int, progress: Progress) -> NDArray[np.float32]:
+    def recipe(self, supersample: int, groups: Patches, progress: Progress) -> NDArray[np.float32]:
         """The recipe's material of every texel that a chart touches: (size, size, 6), see `COLUMNS`; 0 off the charts.
 
         Args:
-            supersample: samples along each edge of a texel.
+            supersample: samples along each edge of a texel. groups: of `patches`.
         """
-        size = self._layout.size
+        size, features = self._layout.size, self._features(groups)
         maps, counts = np.zeros((size, size, COLUMNS), np.float32), np.zeros((size, size), np.int32)
         todo = bands(size)
 
@@ -61,11 +62,11 @@ class Texels:
             samples = covered_samples(self._layout, supersample, rows)
             on_chart = samples.triangle >= 0
             row, column = (k // supersample for k in np.nonzero(on_chart))
-            values = self._evaluate(samples.where(on_chart), supersample, self._features(rows), row * size + column)
+            values = self._evaluate(samples.where(on_chart), supersample, features, (rows.start + row) * size + column)
             _average(on_chart, values, supersample, maps[band], counts[band])
             bare = (counts[band] == 0) & (self._touched.triangle[band] >= 0)
             some = Surface(self._touched.triangle[band][bare], self._touched.barycentric[band][bare])
-            maps[band][bare] = self._evaluate(some, 1, self._features(rows), np.flatnonzero(bare))
+            maps[band][bare] = self._evaluate(some, 1, features, rows.start * size + np.flatnonzero(bare))
 
         for first in range(0, len(todo), TASKS):
             progress("texels", first, len(todo))
@@ -73,17 +74,15 @@ class Texels:
         progress("texels", len(todo), len(todo))
         return maps
 
-    def _features(self, rows: range) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
-        """Convexity and occlusion of each texel of some rows, flat; None where the recipe asks for neither."""
+    def _features(self, groups: Patches) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Convexity and occlusion of each texel, flat; None where the recipe asks for neither."""
         if not self._made.recipe.follows_surface:
             return None
-        triangle = self._touched.triangle[rows.start : rows.stop]
-        on_chart = triangle >= 0
-        some = Surface(triangle[on_chart], self._touched.barycentric[rows.start : rows.stop][on_chart])
+        on_chart = self._touched.triangle >= 0
+        some = self._touched.where(on_chart)
         point, normal = some.interpolate(self._corners), some.interpolate(self._normals)
-        found = self._made.lookup.surface(point, normal, self._texel[some.triangle])
-        features = np.zeros((2, triangle.size), np.float32)
-        features[:, on_chart.ravel()] = found.convexity, found.occlusion
+        features = np.zeros((2, on_chart.size), np.float32)
+        features[:, on_chart.ravel()] = self._made.lookup.shared(point, normal, groups.first, groups.of_texel)
         return features[0], features[1]
 
     def _evaluate(self, samples: Surface, supersample: int, features, texel) -> NDArray[np.float32]:  # type: ignore[no-untyped-def]

@@ -9,6 +9,7 @@ Masking-Shadowing Function", Eq. 99; Heitz 2018, "Sampling the GGX Distribution 
 """
 
 import math
+from typing import Any
 
 import numba
 import numpy as np
@@ -20,7 +21,7 @@ MIN_ALPHA = 1e-4
 compiled = numba.njit(inline="always", error_model="numpy", cache=True)
 
 
-def alpha_from_roughness(roughness: float) -> float:
+def alpha_from_roughness(roughness: Any) -> Any:
     """alpha = roughness squared, the one place where it is made."""
     return roughness * roughness
 

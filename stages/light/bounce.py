@@ -98,9 +98,9 @@ def _chunk(
 ) -> None:
     """What some points see of the surface, added to rows `part` of `mean` and `gap`."""
     n, wo = points.n[part], points.wo[part]
-    frame = (n, *tangent_frame(n))
+    frame, alphas = (n, *tangent_frame(n)), terms.alphas(part)
     unused = np.zeros((len(part), len(lights.cells.energy)), np.float32)
-    drawn = rays.draw(frame, wo, starts(points, part), pixel, terms.alphas, lights, unused)
+    drawn = rays.draw(frame, wo, starts(points, part), pixel, alphas, lights, unused)
     hits = scene.intersect(drawn.origin, drawn.direction)
     if not hits.mask.any():
         return
@@ -112,9 +112,8 @@ def _chunk(
     shown = np.ascontiguousarray(maps[:, terms.summed])
     sampled = (rays.counts, rays.bounds, rays.slots, terms.principled)
     where = (part, terms.summed)
-    accumulate_bounce(
-        *frame, wo, terms.alphas, sampled, drawn, hit, shown, rays.table, where, mean, gap
-    )
+    albedo = rays.albedo(terms, (n * wo).sum(-1).astype(np.float64), part)
+    accumulate_bounce(*frame, wo, alphas, sampled, drawn, hit, shown, albedo, where, mean, gap)
     mirrored = hit[drawn.row[:, -1]]
     seen = mirrored >= 0
     cosine = (n[seen] * wo[seen]).sum(-1, keepdims=True).astype(np.float64).clip(0, 1)

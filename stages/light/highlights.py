@@ -32,8 +32,11 @@ AROUND = (0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25)
 def open_highlights(
     points: GBuffer, lamps: Lamps, alphas: NDArray[np.float32], channels: int = CHANNELS
 ) -> NDArray[np.float32]:
-    """What points show of lamps with nothing in the way, (P, 2 S, channels): terms A of the S lobes `alphas`, then B."""
-    shown = np.empty((len(points.n), 2 * len(alphas), channels), np.float32)
+    """What points show of lamps with nothing in the way, (P, 2 S, channels): terms A of the S lobes, then B.
+
+    Args: alphas: (P, S) of the lobes.
+    """
+    shown = np.empty((len(points.n), 2 * alphas.shape[1], channels), np.float32)
     light = (lamps.direction, lamps.spread, np.ascontiguousarray(lamps.flux[:, :channels]))
     in_parts(lambda start, end: _show(points.n, points.wo, alphas, light, start, end, shown), len(shown), 512)
     return shown
@@ -74,7 +77,7 @@ def put_back(
 def _show(n, wo, alphas, light, start, end, shown):  # type: ignore[no-untyped-def]
     f32 = np.float32
     direction, spread, flux = light
-    lobes, count = len(alphas), len(spread)
+    lobes, count = alphas.shape[1], len(spread)
     sin2, cosine = np.empty(count, f32), np.empty(count, f32)
     tan2, grazing, blur, window = np.empty(count, f32), np.empty(count, f32), np.empty(count, f32), np.empty(count, f32)
     weights, radiance = np.empty(2 * lobes * count, f32), np.empty((count, shown.shape[2]), f32)
@@ -104,7 +107,7 @@ def _show(n, wo, alphas, light, start, end, shown):  # type: ignore[no-untyped-d
             weight = weights[: 2 * lobes * m].reshape((2 * lobes, m))
             for a in range(lobes):
                 for i in range(m):
-                    a2 = alphas[a] * alphas[a] + blur[i]
+                    a2 = alphas[p, a] * alphas[p, a] + blur[i]
                     q = sin2[i] + a2 * (f32(1) - sin2[i])
                     masking = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) + math.sqrt(f32(1) + a2 * tan2[i]))
                     f = window[i] * a2 / (q * q * masking)

@@ -42,6 +42,8 @@ BLOCK = 4
 
 POINTS_PER_TASK = 4096
 
+inline = numba.njit(inline="always", error_model="numpy", cache=True)
+
 fast = numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
 
 
@@ -141,15 +143,18 @@ def _weighted(
     mean: NDArray[np.float32], noise: NDArray[np.float32], near: Neighbours, power: int, joint: tuple[int, ...] = ()
 ) -> NDArray[np.float32]:
     """Over each point's neighbours: the weighted mean of the sums, power 1, or that mean's variance, power 2."""
-    flat, noise = (np.ascontiguousarray(_rows(a)) for a in (mean, noise))
-    values, result = flat if power == 1 else noise, np.empty_like(flat)
-    shared, geometry = np.isin(np.arange(mean.shape[1]), joint), (near.index, near.pixel, near.n, near.point)
+    noisy = np.asarray((noise > 0).any((0, 2)))  # the others stay as they are
+    own = np.array([k for k in np.flatnonzero(noisy) if k not in joint], np.int64)
+    shared = np.array([k for k in joint if noisy[k]], np.int64)
+    mean, noise = np.ascontiguousarray(mean), np.ascontiguousarray(noise)
+    values, result = mean if power == 1 else noise, np.empty_like(mean)
+    geometry = (near.index, near.pixel, near.n, near.point)
 
     def part(start: int, end: int) -> None:
-        _average(flat, noise, values, power, shared, mean.shape[-1], geometry, start, end, result)
+        _average(mean, noise, values, power, own, shared, geometry, start, end, result)
 
     in_parts(part, len(mean), POINTS_PER_TASK)
-    return result.reshape(mean.shape)
+    return result
 
 
 def _rows(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -230,54 +235,43 @@ def _same(n, point, p, q):  # type: ignore[no-untyped-def]
 
 
 @fast
-def _unlike(mean, noise, p, q, k):  # type: ignore[no-untyped-def]
-    """Squared difference of one value at two points, as a multiple of what noise explains."""
-    difference = mean[p, k] - mean[q, k]
-    return difference * difference / (noise[p, k] + min(noise[p, k], noise[q, k]) + np.float32(1e-20))
-
-
-@fast
-def _alike_together(mean, noise, channels, p, q):  # type: ignore[no-untyped-def]
+def _alike_together(mean, noise, p, q):  # type: ignore[no-untyped-def]
     """How far noise explains the differences of the first sum at two points, taken together, 0 to 1."""
     f32 = np.float32
-    excess, count = f32(0), 0
-    for k in range(channels):
-        if noise[p, k] > f32(0):
-            excess += _unlike(mean, noise, p, q, k)
-            count += 1
-    return max(f32(0), f32(1) - excess / (f32(TOGETHER) * f32(max(count, 1))))
+    excess, count = f32(0), f32(0)
+    for c in range(mean.shape[2]):
+        unlike = _unlike(mean[p, 0, c], noise[p, 0, c], mean[q, 0, c], noise[q, 0, c])
+        counts = f32(1) if noise[p, 0, c] > f32(0) else f32(0)
+        excess += counts * min(unlike, f32(1e9))
+        count += counts
+    return max(f32(0), f32(1) - excess / (f32(TOGETHER) * max(count, f32(1))))
+
+
+@inline
+def _unlike(mine, my_noise, other, other_noise):  # type: ignore[no-untyped-def]
+    """Squared difference of one value at two points, as a multiple of what noise explains."""
+    return (mine - other) * (mine - other) / (my_noise + min(my_noise, other_noise) + np.float32(1e-20))
 
 
 @fast
-def _share(unlike, shared, together):  # type: ignore[no-untyped-def]
-    """Give joint sums what they are unlike on average, channel by channel, in place. unlike: (sums, channels)."""
-    together[:] = 0
-    count = 0
-    for k in range(len(shared)):
-        if shared[k]:
-            count += 1
-            for c in range(len(together)):
-                together[c] += unlike[k, c]
-    share = np.float32(1) / np.float32(max(count, 1))
-    for k in range(len(shared)):
-        if shared[k]:
-            for c in range(len(together)):
-                unlike[k, c] = together[c] * share
+def _average(mean, noise, values, power, own, shared, near, start, end, result):  # type: ignore[no-untyped-def]
+    """Sum of w^power values over the sum of w, to that power.
 
-
-@fast
-def _average(mean, noise, values, power, shared, channels, near, start, end, result):  # type: ignore[no-untyped-def]
-    """Sum of w^power values over the sum of w, to that power."""
+    own: numbers of the sums that have weights of their own, each channel one. shared: of those that share them channel by
+    channel, by what they are unlike on average.
+    """
     f32 = np.float32
     index, pixel, n, point = near
     height, width = index.shape
-    size = mean.shape[1]
-    total, weight, unlike = np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
-    together, by_sum = np.empty(channels, np.float32), unlike.reshape(-1, channels)
+    sums, channels = mean.shape[1:]
+    total, weight = np.empty((sums, channels), np.float32), np.empty((sums, channels), np.float32)
+    unlike, w, whole = np.empty(channels, np.float32), np.empty(channels, np.float32), np.empty(channels, np.float32)
+    share = f32(1 / TOLERANCE) / f32(max(len(shared), 1))
     for p in range(start, end):
         x, y = pixel[p]
         total[:] = values[p]
         weight[:] = 1
+        whole[:] = 1
         for j in range(max(y - RADIUS, 0), min(y + RADIUS, height - 1) + 1):
             for i in range(max(x - RADIUS, 0), min(x + RADIUS, width - 1) + 1):
                 q = index[j, i]
@@ -285,16 +279,32 @@ def _average(mean, noise, values, power, shared, channels, near, start, end, res
                     continue
                 same = _same(n, point, p, q)
                 if same > f32(0):
-                    same *= _alike_together(mean, noise, channels, p, q)
+                    same *= _alike_together(mean, noise, p, q)
                 if same <= f32(0):
                     continue
-                for k in range(size):
-                    unlike[k] = _unlike(mean, noise, p, q, k)
-                _share(by_sum, shared, together)
-                for k in range(size):
-                    left = max(f32(0), f32(1) - unlike[k] * f32(1 / TOLERANCE))
-                    w = same * left * left
-                    weight[k] += w
-                    total[k] += (w if power == 1 else w * w) * values[q, k]
-        for k in range(size):
-            result[p, k] = total[k] / (weight[k] if power == 1 else weight[k] * weight[k])
+                for s in own:
+                    for c in range(channels):
+                        u = _unlike(mean[p, s, c], noise[p, s, c], mean[q, s, c], noise[q, s, c])
+                        left = max(f32(0), f32(1) - u * f32(1 / TOLERANCE))
+                        v = same * left * left
+                        weight[s, c] += v
+                        total[s, c] += (v if power == 1 else v * v) * values[q, s, c]
+                if len(shared) == 0:
+                    continue
+                unlike[:] = 0
+                for s in shared:
+                    for c in range(channels):
+                        unlike[c] += _unlike(mean[p, s, c], noise[p, s, c], mean[q, s, c], noise[q, s, c])
+                for c in range(channels):
+                    left = max(f32(0), f32(1) - unlike[c] * share)
+                    v = same * left * left
+                    whole[c] += v
+                    w[c] = v if power == 1 else v * v
+                for s in shared:
+                    for c in range(channels):
+                        total[s, c] += w[c] * values[q, s, c]
+        for s in shared:
+            weight[s] = whole
+        for s in range(sums):
+            for c in range(channels):
+                result[p, s, c] = total[s, c] / (weight[s, c] if power == 1 else weight[s, c] * weight[s, c])

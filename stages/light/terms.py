@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from stages.core.albedo import cosines, diffuse_table, specular_albedo
+from stages.core.albedo import COSINE_STEPS, cosines, diffuse_table, specular_albedo
 from stages.core.brdf import alpha_from_roughness
 from stages.core.shading import KNOTS, LIGHT_MAPS
 from stages.light import blender
@@ -44,10 +44,13 @@ class Terms:
         """Which of the stored sums are summed, in the order of the kernels."""
         return np.array([j for j in range(self.stored) if j not in self.mirror])
 
-    @property
-    def alphas(self) -> NDArray[np.float32]:
-        """Of the glossy lobes."""
-        return np.array([alpha_from_roughness(r) for r in self.roughness], np.float32)
+    def alphas(self, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Of the glossy lobes of some points, (R, K)."""
+        return np.tile(np.array([alpha_from_roughness(r) for r in self.roughness], np.float32), (len(rows), 1))
+
+    def open_albedo(self, cosine: NDArray, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """What is summed where nothing stands in an even light, at some points with N·V = cosine: (R, summed)."""
+        return between_cosines(self.albedo(), cosine)
 
     def places_of_highlights(self) -> NDArray[np.int64]:
         """Of the lobes with highlights: the stored places of their first sums, then of their second ones."""
@@ -76,6 +79,14 @@ class Terms:
             return np.ones_like(cosine), reflection * blender.mirror_reflectance(cosine)
         s = (1 - cosine) ** 5
         return 1 - s, s
+
+
+def between_cosines(table: NDArray[np.float32], cosine: NDArray) -> NDArray[np.float32]:
+    """Rows of a table over `core.albedo.cosines`. Args: (COSINE_STEPS, C); (R,) N·V. Returns: (R, C)."""
+    x = np.sqrt(cosine.clip(0, 1)) * (COSINE_STEPS - 1)
+    cell = np.minimum(x.astype(np.int64), COSINE_STEPS - 2)
+    within = (x - cell).astype(np.float32)[:, None]
+    return table[cell] * (1 - within) + table[cell + 1] * within
 
 
 _K = len(KNOTS)

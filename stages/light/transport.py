@@ -192,7 +192,8 @@ def smoothed(
     if not terms.highlights:
         return reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
     places = terms.places_of_highlights()
-    shown = highlights.open_highlights(points, lights.lamps, terms.alphas[list(terms.highlights)], sums.mean.shape[2])
+    alphas = np.ascontiguousarray(terms.alphas(np.arange(len(points.n)))[:, list(terms.highlights)])
+    shown = highlights.open_highlights(points, lights.lamps, alphas, sums.mean.shape[2])
     kept = highlights.take_out(sums.mean, sums.variance, shown, places, near)
     result = reconstruction.smoothed(sums.mean, sums.variance, near, terms.joint)
     highlights.put_back(result, sums.mean, kept, places)
@@ -257,7 +258,7 @@ def _tile(
 ) -> None:
     """The sums of a tile's points, written to rows `part` of `mean` and `gap`."""
     n, wo, cells = points.n[part], points.wo[part], lights.cells
-    frame, alphas = (n, *tangent_frame(n)), terms.alphas
+    frame, alphas = (n, *tangent_frame(n)), terms.alphas(part)
     chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
     aim(n, wo, wanted[part], AIM, (cells.direction, cells.radius, cells.energy, cells.first), chosen, aimed)
     drawn = rays.draw(frame, wo, starts(points, part), pixel, alphas, lights, chosen)
@@ -266,9 +267,10 @@ def _tile(
     seen = (lights.pyramid, lights.level_start, *excess)
     sampled = (rays.counts, rays.bounds, rays.slots, terms.principled)
     where = (part, terms.summed)
-    accumulate(*frame, wo, alphas, sampled, drawn, occluded, rays.table, seen, where, mean, gap)
+    cosine = (n * wo).sum(-1).astype(np.float64).clip(0, 1)
+    accumulate(*frame, wo, alphas, sampled, drawn, occluded, rays.albedo(terms, cosine, part), seen, where, mean, gap)
     mean[part[:, None], terms.mirror] = gap[part[:, None], terms.mirror] = 0
-    weights = np.stack(terms.mirror_weights((n * wo).sum(-1).astype(np.float64).clip(0, 1)))
+    weights = np.stack(terms.mirror_weights(cosine))
     for e, environment in enumerate(lights.environments):
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
 
@@ -297,7 +299,7 @@ class Rays:
     its lobe, rays of that lobe, place among all light rays. bounds: first slot of the first half's lobe rays, its light
     rays, the second half's lobe rays, its light rays, and their end. shift: (CLASSES, 2). turn: (CLASSES, S, 2), cosine
     and sine of a lobe sample's azimuth. density: of a `LightSet`, times each environment's rays.
-    table: open-point albedo of `Terms`, without rows for averaged points. jitter: by which points of one class differ.
+    jitter: by which points of one class differ. averaged: of `Quality`.
     """
 
     counts: NDArray[np.int64]
@@ -306,9 +308,9 @@ class Rays:
     shift: NDArray[np.float64]
     turn: NDArray[np.float32]
     density: NDArray[np.float32]
-    table: NDArray[np.float32]
     jitter: float
     seed: int
+    averaged: bool
 
     @staticmethod
     def plan(quality: Quality, lights: LightSet, seed: int, terms: Terms = GLTF) -> "Rays":
@@ -325,8 +327,12 @@ class Rays:
         turn = np.stack([np.cos(azimuth), np.sin(azimuth)], -1).astype(np.float32)
         density = lights.density * np.pad(light_counts, (0, MAX_LIGHTS - len(light_counts))).astype(np.float32)
         assert turn.shape == (CLASSES, len(slots), 2)
-        table, jitter = (terms.albedo()[:0], 1.0) if quality.averaged else (terms.albedo(), 1 / CLASSES)
-        return Rays(counts, slots, bounds, shift, turn, density, table, jitter, seed)
+        jitter = 1.0 if quality.averaged else 1 / CLASSES
+        return Rays(counts, slots, bounds, shift, turn, density, jitter, seed, quality.averaged)
+
+    def albedo(self, terms: Terms, cosine: NDArray, rows: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Of some open points, by which their sums are normalised; without rows for averaged points."""
+        return np.ascontiguousarray(terms.open_albedo(cosine, rows)[: 0 if self.averaged else None], np.float32)
 
     def draw(
         self,

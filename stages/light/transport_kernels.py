@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.albedo import COSINE_STEPS, MIN_COSINE
+from stages.core.albedo import MIN_COSINE
 from stages.light.blender import F0, burley, fresnel
 from stages.light.environment import bilinear
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
@@ -109,7 +109,7 @@ def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # 
 
     Args:
         n, t, b, wo, origin: (P, 3) world. pixel: (P, 2), its class and its number in the image.
-        samples: slots, shift, turn, jitter and seed of `Rays`. alphas: of the lobes after the cosine.
+        samples: slots, shift, turn, jitter and seed of `Rays`. alphas: (P, K) of the lobes after the cosine.
         excess: texels of a `LightSet`, begin and first of its cells. chosen: of `aim`. rays: arrays of a `Drawn`, written.
     Returns:
         Rays written.
@@ -117,23 +117,25 @@ def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # 
     f32 = np.float32
     slots, shift, turn, spread, seed = samples
     origins, directions, texel, density, row = rays
-    points, knots = len(n), len(alphas)
+    points, knots = len(n), alphas.shape[1]
     lobes = knots + 1
-    view = np.empty((lobes, points, 3), np.float32)  # stretched by each alpha, see core.brdf.sample_vndf
-    jitter = np.empty(points, np.float32)
+    view = np.empty((lobes, 3, points), np.float32)  # stretched by each alpha, see core.brdf.sample_vndf
+    jitter, base = np.empty(points, np.float32), np.empty(points, np.float32)
     for p in range(points):
         x = wo[p, 0] * t[p, 0] + wo[p, 1] * t[p, 1] + wo[p, 2] * t[p, 2]
         y = wo[p, 0] * b[p, 0] + wo[p, 1] * b[p, 1] + wo[p, 2] * b[p, 2]
         z = wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2]
-        view[0, p, 0], view[0, p, 1], view[0, p, 2] = x, y, z
+        view[0, 0, p], view[0, 1, p], view[0, 2, p] = x, y, z
         for k in range(knots):
-            a = alphas[k]
+            a = alphas[p, k]
             s = f32(1) / math.sqrt((x * x + y * y) * a * a + z * z)
-            view[k + 1, p, 0], view[k + 1, p, 1], view[k + 1, p, 2] = x * a * s, y * a * s, z * s
+            view[k + 1, 0, p], view[k + 1, 1, p], view[k + 1, 2, p] = x * a * s, y * a * s, z * s
         jitter[p] = hashed(pixel[p, 1], seed) * spread
+        base[p] = f32(shift[pixel[p, 0], 0]) + jitter[p]
     cell, within = _choose_cells(pixel, samples, excess, chosen, lobes, jitter)
     us, vs, share = np.empty(points, np.float32), np.empty(points, np.float32), np.empty(points, np.float32)
-    found, towards = np.empty(points, np.int32), np.empty((3, points), np.float32)
+    cos, sin = np.empty(points, np.float32), np.empty(points, np.float32)
+    found, towards, up = np.empty(points, np.int32), np.empty((3, points), np.float32), np.empty(points, np.float32)
     used = 0
     for s in range(len(slots)):
         lobe, i, count, place = slots[s]
@@ -145,46 +147,59 @@ def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # 
                 us[p], vs[p], found[p], share[p] = _in_cell(k, within[p, place], line - math.floor(line), excess)
                 share[p] *= f32(count) * chosen[p, k] * f32(FINE * FINE / (4 * math.pi))
             for p in range(points):
-                towards[0, p], towards[1, p], towards[2, p] = on_square(us[p], vs[p])
+                x, y, z = on_square(us[p], vs[p])
+                towards[0, p], towards[1, p], towards[2, p] = x, y, z
+                up[p] = x * n[p, 0] + y * n[p, 1] + z * n[p, 2] if cell[p, place] >= 0 else f32(-1)
+        else:
+            for p in range(points):
+                c = pixel[p, 0]
+                cos[p], sin[p] = turn[c, s, 0], turn[c, s, 1]
+            _towards(view, lobe, base, (f32(offset0), f32(i), f32(1 / max(count, 1))), cos, sin, alphas, towards, up)
+            for p in range(points):
+                x, y, z = towards[0, p], towards[1, p], up[p]
+                towards[0, p] = x * t[p, 0] + y * b[p, 0] + z * n[p, 0]
+                towards[1, p] = x * t[p, 1] + y * b[p, 1] + z * n[p, 1]
+                towards[2, p] = x * t[p, 2] + y * b[p, 2] + z * n[p, 2]
         for p in range(points):
-            c = pixel[p, 0]
             row[p, s] = -1
-            if lobe >= lobes:
-                x, y, z = towards[0, p], towards[1, p], towards[2, p]
-                if cell[p, place] < 0 or x * n[p, 0] + y * n[p, 1] + z * n[p, 2] <= 0:
-                    continue
-                directions[used, 0], directions[used, 1], directions[used, 2] = x, y, z
+            if up[p] > f32(0):
+                directions[used, 0], directions[used, 1], directions[used, 2] = towards[0, p], towards[1, p], towards[2, p]
+                origins[used, 0], origins[used, 1], origins[used, 2] = origin[p, 0], origin[p, 1], origin[p, 2]
                 texel[used], density[used] = found[p], share[p]
-            else:
-                ox, oy, oz = view[0, p, 0], view[0, p, 1], view[0, p, 2]
-                if lobe < 0:  # the mirror direction
-                    x, y, z = -ox, -oy, oz
-                else:
-                    first = f32(shift[c, 0] + offset0) + jitter[p]
-                    u = (f32(i) + (first - f32(math.floor(first)))) / f32(count)
-                    cos, sin = turn[c, s, 0], turn[c, s, 1]
-                    if lobe == 0:
-                        radius = math.sqrt(u)
-                        x, y, z = radius * cos, radius * sin, math.sqrt(max(f32(1) - u, f32(0)))
-                    else:
-                        a = alphas[lobe - 1]
-                        vx, vy, vz = view[lobe, p, 0], view[lobe, p, 1], view[lobe, p, 2]
-                        cap = (f32(1) - u) * (f32(1) + vz) - vz
-                        radius = math.sqrt(max(f32(1) - cap * cap, f32(0)))
-                        mx, my, mz = (radius * cos + vx) * a, (radius * sin + vy) * a, cap + vz
-                        norm = f32(1) / math.sqrt(mx * mx + my * my + mz * mz)
-                        mx, my, mz = mx * norm, my * norm, mz * norm
-                        twice = f32(2) * (ox * mx + oy * my + oz * mz)
-                        x, y, z = twice * mx - ox, twice * my - oy, twice * mz - oz
-                if z <= 0:
-                    continue
-                for d in range(3):
-                    directions[used, d] = x * t[p, d] + y * b[p, d] + z * n[p, d]
-            for d in range(3):
-                origins[used, d] = origin[p, d]
-            row[p, s] = used
-            used += 1
+                row[p, s] = used
+                used += 1
     return used
+
+
+@fast
+def _towards(view, lobe, base, sample, cos, sin, alphas, towards, up):  # type: ignore[no-untyped-def]
+    """Where one sample of a lobe (-1: the mirror) points from each point, in its own frame.
+
+    view: of `draw`. base: (P,) shift of each point. sample: shift, number and inverse of the count. cos, sin: (P,) of its
+    azimuth. towards: its first two rows written, x and y. up: (P,), written, z.
+    """
+    f32 = np.float32
+    offset, number, inverse = sample
+    ox, oy, oz = view[0, 0], view[0, 1], view[0, 2]
+    if lobe < 0:
+        for p in range(len(up)):
+            towards[0, p], towards[1, p], up[p] = -ox[p], -oy[p], oz[p]
+        return
+    vx, vy, vz = view[lobe, 0], view[lobe, 1], view[lobe, 2]
+    for p in range(len(up)):
+        first = base[p] + offset
+        u = (number + (first - np.floor(first))) * inverse
+        if lobe == 0:
+            radius = math.sqrt(u)
+            towards[0, p], towards[1, p] = radius * cos[p], radius * sin[p]
+            up[p] = math.sqrt(max(f32(1) - u, f32(0)))
+        else:
+            a = alphas[p, lobe - 1]
+            cap = (f32(1) - u) * (f32(1) + vz[p]) - vz[p]
+            radius = math.sqrt(max(f32(1) - cap * cap, f32(0)))
+            mx, my, mz = (radius * cos[p] + vx[p]) * a, (radius * sin[p] + vy[p]) * a, cap + vz[p]
+            twice = f32(2) * (ox[p] * mx + oy[p] * my + oz[p] * mz) / (mx * mx + my * my + mz * mz)
+            towards[0, p], towards[1, p], up[p] = twice * mx - ox[p], twice * my - oy[p], twice * mz - oz[p]
 
 
 @fast
@@ -297,14 +312,14 @@ def weigh(  # type: ignore[no-untyped-def]
 
     Args:
         n, t, b, wo: (P, 3) world. wi: three components, (S,) each, of which the first `count` are read.
-        alphas: of the glossy lobes. counts: rays of each lobe. principled: of `Terms`. scratch: four times (S,).
+        alphas: (P, K) of the glossy lobes. counts: rays of each lobe. principled: of `Terms`. scratch: four times (S,).
         density: (S,), written: of the lobe rays, in rays per steradian. inverse: (S,), written: 1 / density.
         weight: (sums, count), written.
     """
     f32 = np.float32
     dx, dy, dz = wi
     s5, sin2, cos2, tan2 = scratch
-    knots = len(alphas)
+    knots = alphas.shape[1]
     blender, departure, reflection = principled[0], f32(principled[1]), f32(principled[2])
     ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
     nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
@@ -333,9 +348,9 @@ def weigh(  # type: ignore[no-untyped-def]
             s5[i] = fresnel(cosine)
             weight[0, i] = burley(wo_z, wi_z, cosine, f32(0), departure)
             for k in range(knots):
-                weight[1 + k, i] = burley(wo_z, wi_z, cosine, f32(math.sqrt(alphas[k])), departure)
+                weight[1 + k, i] = burley(wo_z, wi_z, cosine, f32(math.sqrt(alphas[p, k])), departure)
     for k in range(knots):
-        a2 = alphas[k] * alphas[k]
+        a2 = alphas[p, k] * alphas[p, k]
         lambda_o = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) - f32(1))
         scale = f32(0.25) * a2 / (f32(math.pi) * wo_z)
         share = f32(counts[k + 1]) / (f32(1) + lambda_o)
@@ -359,33 +374,29 @@ def weigh(  # type: ignore[no-untyped-def]
 
 
 @inline
-def _scales(table, n, wo, p, j, first, second):  # type: ignore[no-untyped-def]
+def _scales(albedo, p, j, first, second):  # type: ignore[no-untyped-def]
     """Of sum j at point p: what makes both halves of the rays, the first and the second a mean each.
 
-    Divided by their own weights and multiplied by the open-point albedo; plain sums where the table has no rows.
+    Divided by their own weights and multiplied by the open-point albedo; plain sums where `albedo` has no rows.
     """
     f32 = np.float32
-    if len(table) == 0:
+    if len(albedo) == 0:
         return f32(1), f32(2), f32(2)
-    wo_z = max(wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2], f32(MIN_COSINE * 0.5))
-    position = math.sqrt(min(wo_z, f32(1))) * f32(COSINE_STEPS - 1)
-    cell = min(int(position), COSINE_STEPS - 2)
-    x = position - f32(cell)
-    albedo = table[cell, j] * (f32(1) - x) + table[cell + 1, j] * x
+    whole = albedo[p, j]
     return (
-        albedo / (first + second) if first + second > 0 else f32(0),
-        albedo / first if first > 0 else f32(0),
-        albedo / second if second > 0 else f32(0),
+        whole / (first + second) if first + second > 0 else f32(0),
+        whole / first if first > 0 else f32(0),
+        whole / second if second > 0 else f32(0),
     )
 
 
 @fast
-def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, table, seen, where, out, gap):  # type: ignore[no-untyped-def]
+def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, albedo, seen, where, out, gap):  # type: ignore[no-untyped-def]
     """Sum the rays of each point.
 
     Args:
-        n, t, b, wo: (P, 3) world. alphas: of the glossy lobes. sampled: counts, bounds and slots of `Rays`, principled of
-        `Terms`. rays: of `draw`, occluded: of the scene. table: open-point albedo; without rows, sums are
+        n, t, b, wo: (P, 3) world. alphas: (P, K) of the glossy lobes. sampled: counts, bounds and slots of `Rays`, principled
+        of `Terms`. rays: of `draw`, occluded: of the scene. albedo: (P, sums) of an open point; without rows, sums are
         plain, see `_scales`, and the light is looked up as it is.
         seen: pyramid, level_start, fine, block, peak of a `LightSet`; density of `Rays`; number of `Cells`; aimed of `aim`.
         where: each point's row of `out` and `gap`, and the place of each sum in it.
@@ -399,7 +410,7 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, table, seen, where,
     lights = len(cells)
     points, most = row.shape
     most = -(-most // LANES) * LANES
-    terms, levels = table.shape[1], len(level_start)
+    terms, levels = albedo.shape[1], len(level_start)
     dx, dy, dz = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
     s5, sin2, cos2 = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
     scratch = (s5, sin2, cos2, np.empty(most, np.float32))
@@ -411,7 +422,7 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, table, seen, where,
     radiance = np.empty((most, 2 * CHANNELS), np.float32)  # of the residual, then of the excess
     total = np.empty((2, terms, 2 * CHANNELS), np.float32)
     texel_angle = 4 * math.pi / (SQUARE * SQUARE)
-    filtering = f32(0.25 / texel_angle) if len(table) > 0 else f32(0)
+    filtering = f32(0.25 / texel_angle) if len(albedo) > 0 else f32(0)
     for p in range(points):
         for half in range(2):
             m = lobes = 0
@@ -472,7 +483,7 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, table, seen, where,
                     radiance[i, CHANNELS + 3 * light[i] + c] = share * peak[drawn[ray[i]], c]
             np.dot(weight, radiance[:count], total[half])
         for j in range(terms):
-            scale, scale0, scale1 = _scales(table, n, wo, p, j, total[0, j, WEIGHT], total[1, j, WEIGHT])
+            scale, scale0, scale1 = _scales(albedo, p, j, total[0, j, WEIGHT], total[1, j, WEIGHT])
             total[0, j, WEIGHT] = total[1, j, WEIGHT] = 0
             target, place = where[0][p], where[1][j]
             for c in range(CHANNELS):
@@ -503,7 +514,7 @@ def mirror(radiance, rays, occluded, weights, where, first, out):  # type: ignor
 
 @fast
 def accumulate_bounce(  # type: ignore[no-untyped-def]
-    n, t, b, wo, alphas, sampled, rays, hit, shown, table, where, out, gap
+    n, t, b, wo, alphas, sampled, rays, hit, shown, albedo, where, out, gap
 ):
     """Add to the sums of each point what its lobe rays see of the surface itself.
 
@@ -514,7 +525,7 @@ def accumulate_bounce(  # type: ignore[no-untyped-def]
     counts, bounds, _, principled = sampled
     _, directions, _, _, row = rays
     points, slots = row.shape
-    terms = table.shape[1]
+    terms = albedo.shape[1]
     dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
     s5, sin2, cos2 = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
     scratch = (s5, sin2, cos2, np.empty(slots, np.float32))
@@ -546,7 +557,7 @@ def accumulate_bounce(  # type: ignore[no-untyped-def]
         if not any_hit:
             continue
         for j in range(terms):
-            scale, scale0, scale1 = _scales(table, n, wo, p, j, normaliser[0, j], normaliser[1, j])
+            scale, scale0, scale1 = _scales(albedo, p, j, normaliser[0, j], normaliser[1, j])
             target, place = where[0][p], where[1][j]
             for c in range(CHANNELS):
                 out[target, place, c] += (total[0, j, c] + total[1, j, c]) * scale

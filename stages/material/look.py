@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.color import srgb_decode
+from stages.core.parallel import compiled
 from stages.material.place import Place
 
 Array = NDArray[Any]
@@ -49,10 +50,20 @@ def _ramp(stops: tuple[str, ...]) -> Array:
 
 def palette(t: Array, *stops: str) -> Array:
     """Colours along evenly spaced sRGB hex stops. Args: t (P,), clamped to 0 … 1. Returns: (3, P) linear."""
-    ramp = _ramp(stops if len(stops) > 1 else stops * 2)
-    x = np.clip(t, 0, 1) * np.float32(STEPS - 1.001)
-    low = x.astype(np.int32)
-    return ramp[:, low] + (ramp[:, low + 1] - ramp[:, low]) * (x - low)
+    t = np.ascontiguousarray(t, np.float32)
+    color = np.empty((3, len(t)), np.float32)
+    _along_ramp(_ramp(stops if len(stops) > 1 else stops * 2), t, color)
+    return color
+
+
+@compiled
+def _along_ramp(ramp, t, color):  # type: ignore[no-untyped-def]
+    for i in range(len(t)):
+        x = min(max(t[i], np.float32(0)), np.float32(1)) * np.float32(STEPS - 1.001)
+        low = int(x)
+        within = x - np.float32(low)
+        for c in range(3):
+            color[c, i] = ramp[c, low] + (ramp[c, low + 1] - ramp[c, low]) * within
 
 
 def mix(a: Array | float, b: Array | float, t: Array | float) -> Array:
@@ -85,9 +96,12 @@ def to_oklab(linear: NDArray) -> NDArray:
     return TO_LAB @ np.cbrt(TO_LMS @ linear)
 
 
+FROM_LMS, FROM_LAB = np.linalg.inv(TO_LMS), np.linalg.inv(TO_LAB)
+
+
 def from_oklab(lab: NDArray) -> NDArray:
     """OKLab to linear Rec. 709, clamped to 0 … 1. Args: (3, P). Returns: (3, P)."""
-    return np.clip(np.linalg.solve(TO_LMS, np.linalg.solve(TO_LAB, lab) ** 3), 0, 1)
+    return np.clip(FROM_LMS @ (FROM_LAB @ lab) ** 3, 0, 1)
 
 
 def each(t: Array, shown: Array | float, *stops: str) -> Array:

@@ -69,13 +69,18 @@ def _lattice(at: Place, wavelength: float, stretch: Axes) -> tuple[Axes, Period]
 
 def noise(at: Place, size: float, seed: int = 0, stretch: Axes = SQUARE) -> Array:
     """One octave of gradient noise, mean 0, deviation 1 where the footprint lets it be seen. Returns: (P,)."""
+    return _octave(at, size, seed, stretch) * fading(size * min(stretch), at.footprint)
+
+
+def _octave(at: Place, size: float, seed: int, stretch: Axes) -> Array:
+    """`noise` as if all of it could be seen."""
     out = np.empty(len(at), np.float32)
     scale, period = _lattice(at, size, stretch)
     number = seed_of(at, seed)
     shift = tuple(float(number >> s & 255) / 256 + 0.37 for s in (0, 8, 16))
     x, y, z = at.p
     kernels.gradient_noise(x, y, z, scale, shift, period, number, out)
-    return out * fading(size * min(stretch), at.footprint)
+    return out
 
 
 def fbm(at: Place, spectrum: Spectrum, seed: int = 0) -> Array:
@@ -83,13 +88,14 @@ def fbm(at: Place, spectrum: Spectrum, seed: int = 0) -> Array:
     t, s = spectrum.tails, spectrum.skew
     spread = math.sqrt(1 + 2 * t * 1.596 + 3 * t * t + 2 * s * s)
     thinnest = float(at.footprint.min()) if len(at) else 1.0
-    total = np.zeros(len(at), np.float32)
+    total, level = np.zeros(len(at), np.float32), np.log2(at.footprint)
     envelope = np.exp(spectrum.patch * noise(at, 3 * spectrum.size, seed + 977, spectrum.stretch)) if spectrum.patch else None
     for k, strength in enumerate(spectrum.strengths()):
         size = spectrum.size / 2**k
         if size * min(spectrum.stretch) <= thinnest:
             break
-        octave = noise(at, size, seed * 31 + k, spectrum.stretch)
+        octave = _octave(at, size, seed * 31 + k, spectrum.stretch)
+        octave *= np.clip(np.float32(math.log2(size * min(spectrum.stretch))) - level, 0, 1)  # `fading`
         if t or s:
             octave = (octave * (1 + t * abs(octave)) + s * (octave * octave - fading(size, at.footprint) ** 2)) / spread
         if envelope is not None and k >= 1:

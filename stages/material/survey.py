@@ -13,6 +13,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from stages.core.parallel import compiled, in_parallel, slices
 from stages.material.directions import WHOLE, Pieces, measure
 from stages.material.surface import Array, Surface
 
@@ -31,8 +32,11 @@ RAYS = 48
 OFFSET = 1e-4
 """How far above the surface a ray begins, object sizes."""
 
-MIXED = 3
-"""Points of the survey that a look-up mixes."""
+MIXED, AROUND = 3, 24
+"""Points of the survey that a look-up mixes, and those among which it finds them where neighbours search together."""
+
+TASK = 1 << 17
+"""Points of one thread's task."""
 
 Blocked = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.bool_]]
 """Whether rays meet the object. Args: origins, directions (R, 3). Returns: (R,)."""
@@ -93,6 +97,59 @@ class Lookup:
         convexity, occlusion = ((weight * values[index]).sum(1) for values in (self.survey.convexity, self.survey.occlusion))
         best = np.take_along_axis(index, weight.argmax(1)[:, None], 1)[:, 0]
         return Surface(point, normal, footprint, convexity, occlusion, self.survey.piece[best])
+
+
+    def shared(
+        self, point: Array, normal: Array, first: NDArray[np.int64], group: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Convexity and occlusion, as of `surface`, of points so close together that each group of them searches once.
+
+        Args:
+            point, normal: (P, 3) float32. first: (G,) a point of each group. group: (P,) of each point.
+        Returns:
+            (P,) each.
+        """
+        count = min(AROUND, len(self.survey.point))
+        near = np.empty((len(first), count), np.int64)
+        mixed = np.empty((2, len(point)), np.float32)
+        known = (self.survey.point, self.survey.normal, np.stack([self.survey.convexity, self.survey.occlusion]))
+
+        def search(rows: slice) -> None:
+            near[rows] = self._tree.query(point[first[rows]], [*range(1, count + 1)])[1]
+
+        def mix(rows: slice) -> None:
+            _mix(point[rows], normal[rows], group[rows], near, known, mixed[:, rows])
+
+        in_parallel(search, slices(len(first), TASK))
+        in_parallel(mix, slices(len(point), TASK))
+        return mixed[0], mixed[1]
+
+
+@compiled
+def _mix(point, normal, group, near, known, mixed):  # type: ignore[no-untyped-def]
+    """`Lookup.surface` of points, each among the neighbours of its group. near: (G, AROUND). mixed: (2, P), written."""
+    positions, normals, values = known
+    least, best = np.empty(MIXED), np.empty(MIXED, np.int64)
+    for p in range(len(point)):
+        least[:] = np.inf
+        for k in near[group[p]]:
+            d = 0.0
+            for c in range(3):
+                d += (positions[k, c] - point[p, c]) ** 2
+            for m in range(MIXED):  # kept in order
+                if d < least[m]:
+                    least[m], d = d, least[m]
+                    best[m], k = k, best[m]
+        total, convexity, occlusion = 0.0, 0.0, 0.0
+        for m in range(min(MIXED, near.shape[1])):
+            k, agree = best[m], 0.0
+            for c in range(3):
+                agree += normals[k, c] * normal[p, c]
+            weight = min(max(agree, 0.02), 1.0) ** 2 / max(np.sqrt(least[m]), 1e-6)
+            total += weight
+            convexity += weight * values[0, k]
+            occlusion += weight * values[1, k]
+        mixed[0, p], mixed[1, p] = convexity / total, occlusion / total
 
 
 def make_survey(vertices: Array, triangles: NDArray[np.int32], normals: Array, blocked: Blocked, seed: int = 0) -> Survey:

@@ -130,7 +130,7 @@ def _radiance(n: NDArray, wo: NDArray, wi: NDArray, light: Tensor, values: Tenso
     wm /= np.linalg.norm(wm, axis=-1, keepdims=True)
     n_l, n_v = torch.from_numpy(wi @ n), float(wo @ n)
     n_h, s = torch.from_numpy(wm @ n), torch.from_numpy((1 - wm @ wo) ** 5)
-    a2 = alpha_from_roughness(r) ** 2  # type: ignore[arg-type]  # a tensor of one number
+    a2 = alpha_from_roughness(r) ** 2  # a tensor of one number
     D = a2 / (np.pi * ((a2 - 1) * n_h**2 + 1) ** 2)
     lambdas = [0.5 * ((1 + a2 * (1 - x**2) / x**2).sqrt() - 1) for x in (n_l, torch.tensor(n_v, dtype=torch.float64))]
     lobe = D / (1 + lambdas[0] + lambdas[1]) / (4 * n_v)

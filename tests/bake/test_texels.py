@@ -9,6 +9,7 @@ from stages.bake import texels
 from stages.bake.evaluate import evaluate
 from stages.bake.raster import Layout, touched_texels
 from stages.bake.raster import Surface as UvSurface
+from stages.bake.visibility import Patches
 from stages.core.progress import silent
 from stages.material.directions import Pieces
 from stages.material.learnt import LearntMaterial
@@ -37,6 +38,12 @@ def where(recipe: Recipe, surface: Surface, pieces: Pieces) -> NDArray:
     return np.c_[surface.point, surface.point]
 
 
+def single(touched: UvSurface) -> Patches:
+    """Each texel a patch of its own."""
+    count = int((touched.triangle >= 0).sum())
+    return Patches(np.arange(count), np.arange(count), np.arange(count))
+
+
 def baked(arrays: dict[str, NDArray], layout: Layout, touched: UvSurface) -> texels.Texels:
     made = LearntMaterial(EVEN, Lookup(EMPTY), small_residual())
     return texels.Texels(made, arrays["vertices"][arrays["triangles"]], arrays["normals"], layout, touched)
@@ -49,7 +56,7 @@ def test_a_texel_holds_its_own_place_on_the_surface(monkeypatch: pytest.MonkeyPa
     arrays, size = prep_arrays(grid(3)), 40
     layout = Layout.of(arrays["uv"], size)
     touched = touched_texels(layout)
-    maps = baked(arrays, layout, touched).recipe(supersample, silent)
+    maps = baked(arrays, layout, touched).recipe(supersample, single(touched), silent)
     row, column = np.mgrid[3 : size - 3, 3 : size - 3]  # whole texels: the sheet begins at 0.05 * 40 = 2
     x, y = ((column + 0.5) / size - 0.05) / 0.9 - 0.5, ((size - row - 0.5) / size - 0.05) / 0.9 - 0.5
     np.testing.assert_allclose(maps[3:-3, 3:-3, 0], x, atol=1e-6)
@@ -64,7 +71,7 @@ def test_a_rim_texel_holds_nothing_from_outside_its_chart(monkeypatch: pytest.Mo
     layout = Layout.of(arrays["uv"], 64)
     touched = touched_texels(layout)
     corners = arrays["vertices"][arrays["triangles"]]
-    maps = baked(arrays, layout, touched).recipe(2, silent)
+    maps = baked(arrays, layout, touched).recipe(2, single(touched), silent)
     flat = [np.flatnonzero(np.ptp(face, axis=0) < 1e-6) for face in corners]
     for f, axis in enumerate(flat):
         mine = touched.triangle == f

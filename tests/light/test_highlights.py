@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from numpy.typing import NDArray
 
 from stages.light import highlights
 from stages.light.environment import Environment
+from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, light_set
 from stages.light.reconstruction import Neighbours
 from stages.light.reference import reference_transport
@@ -16,7 +18,7 @@ from stages.light.transport import Quality, gather, smoothed
 from tests.light import scenes
 
 PLACES = GLTF.places_of_highlights()
-ALPHAS = GLTF.alphas[list(GLTF.highlights)]
+LOBES = len(GLTF.highlights)
 
 
 def night() -> Environment:
@@ -25,6 +27,11 @@ def night() -> Environment:
     pixels[24, ::9] = (30.0, 24.0, 12.0)
     pixels[28:34, 100:106] = 4.0
     return Environment("night", pixels)
+
+
+def alphas(points: GBuffer) -> NDArray[np.float32]:
+    """Of the lobes whose highlights are taken out, for each point."""
+    return GLTF.alphas(np.arange(len(points.n)))[:, list(GLTF.highlights)]
 
 
 @pytest.mark.parametrize("cosine", (0.3, 0.7, 1.0))
@@ -37,12 +44,12 @@ def test_open_highlights_are_what_an_open_point_shows(cosine: float) -> None:
     column = int((0.5 - np.arctan2(mirrored[1], mirrored[0]) / (2 * np.pi)) * 256) % 256
     pixels[row : row + 2, column : column + 2] = (50, 40, 10)
     lights = light_set([Environment("lamp", pixels)])
-    shown = highlights.open_highlights(points, lights.lamps, ALPHAS)[:, :, :3]
+    shown = highlights.open_highlights(points, lights.lamps, alphas(points))[:, :, :3]
     exact = reference_transport(scenes.sphere(1), points, lights.environments[0], 16, np.arange(1))
     expected = torch.cat([exact.E[:, None], exact.A, exact.B], 1).numpy()[:, PLACES]
-    narrow = np.array([0, len(ALPHAS)])
+    narrow = np.array([0, LOBES])
     assert shown[:, narrow] == pytest.approx(expected[:, narrow], rel=0.2, abs=1e-3 * expected.max())
-    wide = np.setdiff1d(np.arange(2 * len(ALPHAS)), narrow)
+    wide = np.setdiff1d(np.arange(2 * LOBES), narrow)
     assert shown[:, wide] == pytest.approx(expected[:, wide], rel=0.08, abs=1e-3 * expected.max())
 
 
@@ -71,7 +78,7 @@ def sunny_sums(in_view: float):  # type: ignore[no-untyped-def]
     """A sphere's pixels, what they show of a sun in the open, and sums that hold a share of it and something else."""
     lights = light_set([scenes.sunny_light(65_000.0)])
     points = scenes.view_of(scenes.sphere(3), 32)
-    shown = highlights.open_highlights(points, lights.lamps, ALPHAS)
+    shown = highlights.open_highlights(points, lights.lamps, alphas(points))
     mean = np.random.default_rng(0).random((len(points.n), GLTF.stored, CHANNELS)).astype(np.float32)
     mean[:, PLACES] += in_view * shown
     return Neighbours.of(points), shown, mean
@@ -79,7 +86,7 @@ def sunny_sums(in_view: float):  # type: ignore[no-untyped-def]
 
 def test_no_lamps_no_highlights() -> None:
     points, near = scenes.view_of(scenes.sphere(2), 16), Neighbours.of(scenes.view_of(scenes.sphere(2), 16))
-    shown = highlights.open_highlights(points, light_set([scenes.even_light()]).lamps, ALPHAS)
+    shown = highlights.open_highlights(points, light_set([scenes.even_light()]).lamps, alphas(points))
     assert not shown.any()
     mean = np.ones((len(points.n), GLTF.stored, CHANNELS), np.float32)
     highlights.take_out(mean, np.ones_like(mean), shown, PLACES, near)

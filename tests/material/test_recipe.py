@@ -173,3 +173,22 @@ def test_nothing_is_known_of_an_empty_survey() -> None:
     surface = Lookup(EMPTY).surface(*(np.ones((3, 3), np.float32),) * 2, np.ones(3, np.float32))
     assert (surface.convexity == 0).all() and (surface.piece == 0).all() and len(WHOLE.centre) == 1
     assert len(evaluate(Recipe(GREY), surface[:0])) == 0
+
+
+def test_points_that_search_together_are_told_what_each_alone_is() -> None:
+    """Convexity and occlusion of groups of near points equal those of single look-ups; a survey may be smaller than a group."""
+    rng = np.random.default_rng(2)
+    for count in (2, 4000):
+        at, normal = rng.random((count, 3)).astype(np.float32), rng.normal(size=(count, 3)).astype(np.float32)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        values = rng.random((2, count)).astype(np.float32)
+        lookup = Lookup(Survey(at, normal, values[0], values[1], np.zeros(count, np.int32), WHOLE))
+        first = rng.random((50, 3)).astype(np.float32)
+        group = np.repeat(np.arange(50), 20)
+        point = first[group] + rng.uniform(-1, 1, (1000, 3)).astype(np.float32) * np.float32(2e-3)
+        point[::20] = first
+        facing = normal[rng.integers(0, count, 1000)]
+        alone = lookup.surface(point, facing, np.ones(1000, np.float32))
+        together = lookup.shared(point, facing, np.arange(0, 1000, 20), group)
+        np.testing.assert_allclose(together[0], alone.convexity, atol=2e-6)
+        np.testing.assert_allclose(together[1], alone.occlusion, atol=2e-6)
