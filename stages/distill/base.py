@@ -15,10 +15,10 @@ from stages.material.masks import settled
 from stages.material.recipe import Recipe
 from stages.material.residual import Residual, combined
 from stages.material.surface import Surface
-from stages.material.survey import Lookup
+from stages.material.survey import POINTS, Lookup
 
 SETTLE_POINTS = 20_000
-"""Survey points on which masks are settled: evenly spread, as a survey's first ones are."""
+"""Survey points on which masks are settled, at the least; a survey has its points face by face, so every few of them."""
 
 
 class Base:
@@ -56,4 +56,4 @@ class Base:
 
 def even_surface(views: Views, count: int) -> Surface:
     """Points spread evenly over the object."""
-    return views.survey.survey.surface()[:count]
+    return views.survey.survey.surface()[: POINTS : max(1, POINTS // count)]
