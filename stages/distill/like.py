@@ -8,7 +8,8 @@ from stages.core.errors import InputError
 from stages.core.schemas import MATERIAL
 from stages.distill.options import DistillOptions
 from stages.material.learnt import LearntMaterial
-from stages.material.recipe import EVEN, Coat, Recipe
+from stages.material.recipe import EVEN, Coat, Mask, Recipe
+from stages.prior.places import PARTS
 
 
 @dataclass(frozen=True)
@@ -30,9 +31,17 @@ class Like:
         times = metres / self.recipe.base.metres if metres is not None else extent / self.extent
         layers = []
         for layer in self.recipe.layers:
-            masks = tuple(replace(mask, size=mask.size / times, level=None) for mask in layer.masks)
+            masks = tuple(_unsettled(mask, times) for mask in layer.masks)
             layers.append(replace(layer, coat=_resized(layer.coat, times), masks=masks))
         return replace(self.recipe, base=_resized(self.recipe.base, times), layers=tuple(layers))
+
+
+def _unsettled(mask: Mask, times: float) -> Mask:
+    """A mask before any mesh was known; where it was found on one, what its word says, to be found again."""
+    if mask.kind in ("pieces", "along"):
+        kind = PARTS[mask.said].kind if mask.said in PARTS else "below"
+        mask = replace(mask, kind=kind, pieces=(), axis=())
+    return replace(mask, size=mask.size / times, level=None)
 
 
 def _resized(coat: Coat, times: float) -> Coat:

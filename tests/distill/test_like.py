@@ -52,6 +52,13 @@ def test_metres_count_before_units() -> None:
     assert carried.layers[0].masks[0].size == pytest.approx(0.02)
 
 
+def test_a_part_that_was_found_on_one_mesh_is_looked_for_on_the_other() -> None:
+    legs = Mask("pieces", 0.3, 0.1, 0.0, level=0.5, said="legs", pieces=(2, 3))
+    recipe = replace(STRIPED, layers=(replace(STRIPED.layers[0], masks=(legs,)),))
+    (mask,) = Like(recipe, "legs", 1.0, "").carried(2.0, None).layers[0].masks
+    assert (mask.kind, mask.pieces, mask.level, mask.said, mask.size) == ("below", (), None, "legs", 0.05)
+
+
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A few steps on a sphere of extent 2."""
