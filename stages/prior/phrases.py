@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.objects import OBJECTS
-from stages.prior.places import PARTS, SHAPES, SHOWS, Region
+from stages.prior.places import GATHERS, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
 from stages.prior.stuffs import BOARDS, COATINGS, GENERIC, KNOWN, PATTERNED, ROOFS
 from stages.prior.tokens import Join, Token, singulars, tokens_of
 
@@ -158,6 +158,8 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
         return None
     if token.value.kind in ("peel", "through") and following.kind in ("comma", "end", "join"):
         return None  # "blue paint peeling off, ..."
+    if token.value.kind in ("show", "through") and following.kind == "part" and now.says_what:
+        return None  # "dark steel showing at the edges"
     if token.value.kind == "of":
         return Join("of", True) if now.region and now.says_what else None
     if token.value.kind == "in":
@@ -181,6 +183,8 @@ def _stands_for_itself(token: Token, now: Phrase, following: Token) -> bool:
 def _begins(token: Token, now: Phrase) -> bool:
     """Whether a token begins a phrase although no word joins it to the one before: "gold rim white porcelain"."""
     if token.kind == "substance":
+        if now.color_only and now.join.kind == "and" and now.where in SHAPES:
+            return False  # "black and white checkerboard tiles"
         return now.placed or bool(now.substance and (now.thing or (token.text in PAINTED and not now.coats)))
     return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS))
 
@@ -223,6 +227,8 @@ def _name(phrase: Phrase, text: str) -> None:
     phrase.boards = phrase.boards or text in BOARDS
     if not old:
         phrase.substance = text
+    elif phrase.colors and KNOWN[old][0].look == "tartan" and _family(old) == _family(text):
+        return  # "green tartan wool"
     elif old.endswith("plated"):
         return  # "silver-plated copper"
     elif text in BOARDS or (text in GENERIC and _family(old) == _family(text)):
@@ -245,6 +251,9 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
         thing = next((name for name in (phrase.where, *singulars(phrase.where)) if name in OBJECTS), "")
         if not phrase.says_what and thing and len(phrases) == 1:
             phrases[number] = replace(phrase, thing=thing, region=None, where="")  # "a tire"
+    if not phrases:
+        return []
+    phrases = _marked(_checked(_peeled([each for phrase in phrases for each in _paintings(phrase, phrases)])))
     result: list[Phrase] = []
     for number, phrase in enumerate(phrases):
         before = result[-1] if result else None
@@ -258,6 +267,10 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             after.finish += phrase.finish
             after.colors[:0] = phrase.colors
             _add(after.weather, phrase.weather)
+        elif before and _only_names(phrase, result):
+            body = next((p for p in reversed(result) if p.join.beneath), result[0])
+            body.thing = phrase.thing
+            _add(body.weather, phrase.weather)
         elif before and phrase.join.kind == "show":
             _show(result, phrase)
         elif before and phrase.join.kind == "through" and phrase.says_what and not phrase.region:
@@ -292,6 +305,102 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
                 phrase.within = before
             result.append(phrase)
     return _in_pairs(result)
+
+
+def _only_names(phrase: Phrase, before: list[Phrase]) -> bool:
+    """Whether a phrase after a comma only says what thing has the stuffs before it: "chrome flaking off brass, a faucet"."""
+    alone = phrase.thing and not (phrase.substance or phrase.colors or phrase.unknown or phrase.animal)
+    return bool(alone) and phrase.join.kind == "comma" and all(p.substance and not p.thing for p in before)
+
+
+PAINTS = {"kintsugi": ("gold", [""]), "graffiti": ("spray paint", ["blue", "red", "yellow"])}
+"""Patterns that say of what they are, and of which colours where nobody says."""
+
+
+def _paintings(phrase: Phrase, beside: list[Phrase]) -> list[Phrase]:
+    """A phrase; one that is a pattern of stuffs that everybody knows, as these, unless they are named beside it."""
+    stuff, colors = PAINTS.get(phrase.where, ("", [""]))
+    if phrase.substance or not stuff or not phrase.region:
+        return [phrase]
+    if any(p.substance == stuff and p.join.kind == "inlay" for p in beside):
+        return []  # "repaired with gold (kintsugi)"
+    if any(map(is_hue, phrase.colors)):
+        return [replace(phrase, substance=stuff)]
+    sizes = [1 + 0.4 * k for k in range(len(colors))]
+    regions = [phrase.region._replace(share=phrase.region.share / n, size=phrase.region.size * n) for n in sizes]
+    joins = [phrase.join, *([Join("with")] * (len(colors) - 1))]
+    return [
+        replace(phrase, join=join, substance=stuff, colors=[c for c in [color] if c], region=region)
+        for join, color, region in zip(joins, colors, regions, strict=True)
+    ]  # fmt: skip
+
+
+CLOTHS = {"gingham": "red", "houndstooth": "black", "argyle": "green", "tattersall": "brown", "buffalo check": "red"}
+"""Checks that are of cloth, and of which colour where nobody says."""
+
+
+def _checked(phrases: list[Phrase]) -> list[Phrase]:
+    """Checks of cloth are of two colours, named before or after them, white being the other: "gingham, blue and white"."""
+    first, *rest = phrases
+    for phrase in phrases:
+        if phrase.where in CLOTHS and not (phrase.substance or phrase.thing):
+            phrase.substance = "fabric"
+    if first.where not in SHAPES or first.region is None or not (first.thing or first.substance) or first.animal:
+        return phrases
+    pair = len(rest) > 1 and all(p.color_only and not p.region for p in rest[:2]) and rest[1].join.kind == "and"
+    if pair and not first.colors and rest[0].join.kind in ("comma", "in"):
+        one, other, rest = rest[0].colors, rest[1].colors, rest[2:]
+    elif first.where in CLOTHS and not (rest and rest[0].color_only):
+        one, other = first.colors or [CLOTHS[first.where]], ["white"]
+    else:
+        return phrases
+    marks = Phrase(Join("with"), colors=other, region=first.region, where=first.where)
+    return [replace(first, colors=one, region=None, where="", placed=False), marks, *rest]
+
+
+UNDERNEATH = ("underneath", "beneath", "below", "under")
+
+
+def _peeled(phrases: list[Phrase]) -> list[Phrase]:
+    """What lies underneath a coat that peels is what it peels off; what gathers on top lies on what is underneath it."""
+    for number, phrase in enumerate(phrases[1:], 1):
+        if phrase.where not in UNDERNEATH or not phrase.says_what:
+            continue
+        before = phrases[:number]
+        off = next((p for p in before if p.join.kind == "peel"), None)
+        coat = next((p for p in before if set(p.weather) & PEELS), None)
+        if off:  # "bark peeling off a log, pale wood underneath"
+            off.substance, off.colors, off.thing = phrase.substance or off.substance, phrase.colors, ""
+            return [*before, *phrases[number + 1 :]]
+        if coat:  # "peeling paint, grey wood underneath"
+            phrase.region, phrase.where, phrase.join = None, "", Join("show")
+        elif number == 1 and phrases[0].substance in GATHERS and phrases[0].region:  # "snow on top, granite underneath"
+            first = replace(phrase, region=None, where="", join=FIRST)
+            return [first, replace(phrases[0], join=Join("with")), *phrases[2:]]
+    for number, (thing, coat, off) in enumerate(zip(phrases, phrases[1:], phrases[2:], strict=False)):
+        if number == 0 and thing.thing and off.join.kind == "peel" and off.substance and coat.says_what and not coat.region:
+            thing.substance, thing.colors = off.substance, off.colors or thing.colors
+            coat.join = Join("peel")  # "a boat with its paint flaking off the bare timber"
+            return [thing, coat, *phrases[3:]]
+    return phrases
+
+
+def _marked(phrases: list[Phrase]) -> list[Phrase]:
+    """An animal's marks in colours that words name, on a ground of its own stuff: "zebra stripes, pink and purple"."""
+    first, *rest = phrases
+    if not first.animal or first.colors or first.substance or not rest or rest[0].region:
+        return phrases
+    coat = "glossy plastic" if first.animal in SHELLED else "cotton" if first.animal in PRINTED else "fur"
+    if rest[0].join.kind == "on" and rest[0].color_only:
+        rest[0].substance = coat  # "leopard spots on tan"
+    elif len(rest) > 1 and rest[0].color_only and rest[0].join.kind in ("comma", "in", "with") and not rest[1].region:
+        one, other = rest[:2]
+        if other.join.kind not in ("and", "on") or not (other.color_only or other.join.kind == "on"):
+            return phrases
+        ground, marks = (one, other) if other.join.kind == "and" else (other, one)
+        ground = replace(ground, join=FIRST, substance=ground.substance or coat)
+        return [ground, replace(first, join=Join("with"), colors=marks.colors), *rest[2:]]
+    return phrases
 
 
 def _within(before: Phrase, phrase: Phrase) -> bool:
@@ -384,14 +493,28 @@ def _show(result: list[Phrase], phrase: Phrase) -> None:
     result[-1].shows = phrase
 
 
+def _on_ground(phrases: list[Phrase]) -> list[Phrase]:
+    """Two colours of a pattern on a stuff are that stuff: "yellow and black stripes on painted metal"."""
+    if len(phrases) < 3:
+        return phrases
+    one, other, ground, *rest = phrases
+    both = one.color_only and other.color_only and not one.region and other.where in SHAPES and other.join.kind == "and"
+    if not both or ground.join.kind != "on" or not ground.substance or ground.region or any(map(is_hue, ground.colors)):
+        return phrases
+    name = "paint" if ground.metal else ground.substance
+    return [replace(p, substance=name, boards=ground.boards, thing=ground.thing) for p in (one, other)] + rest
+
+
 def _in_pairs(phrases: list[Phrase]) -> list[Phrase]:
     """Colours side by side share what follows: "red and white striped canvas", "white with red and blue stripes"."""
+    phrases = _on_ground(phrases)
     for number in range(len(phrases) - 2, -1, -1):
         first, second = phrases[number], phrases[number + 1]
         if first.join.kind == second.join.kind == "half":
             first.region, first.where = Region("left", 0.5), "half"
         if not first.color_only or first.region or second.join.kind not in ("and", "comma", "fade", "half"):
             continue
+        second.finish = second.finish or list(first.finish)
         first.thing = first.thing or ("" if second.where in PARTS else second.thing)
         same = second.join.kind == "and" and _family(second.substance or "stone") not in ("metal", "gem")
         said = second.substance and (second.colors or same)

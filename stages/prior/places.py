@@ -24,7 +24,10 @@ def _table(*entries: tuple[str, Region]) -> dict[str, Region]:
 PARTS = _table(
     ("body, bodies, walls, sides, main body, bodywork, exterior, outside, background, ground, rest, siding, cladding, casing, "
      "housing, enclosure, chassis, outer shell, fuselage, main part, everything else, remainder", Region("all", 1.0)),
-    ("hull", Region("below", 0.6)), ("lower body", Region("below", 0.5)), ("upper body", Region("above", 0.5)),
+    ("hull", Region("below", 0.6)),
+    ("below the waterline, under the waterline, below the water line", Region("below", 0.4)),
+    ("above the waterline, above the water line", Region("above", 0.6)),
+    ("lower body", Region("below", 0.5)), ("upper body", Region("above", 0.5)),
     ("label, sticker, decal, logo, emblem, badge", Region("front", 0.12)),
     ("base, bottom, underside, lower half, lower part, bottom half, lower, lower section", Region("below", 0.5)),
     ("sole, soles, outsole, tread, treads, rubber sole", Region("below", 0.08)),
@@ -66,7 +69,7 @@ TABLE_PARTS = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat
 
 SHAPES = _table(
     ("zigzag, zigzags, chevrons, stripes, stripe, striped, pinstripes, vertical stripes, diagonal stripes, "
-         "racing stripes, racing stripe",
+         "racing stripes, racing stripe, hazard stripes, warning stripes",
      Region("stripes", 0.5, 0.14)),
     ("bands, band, hoops, rings, ring, straps, strap, belts, belt, banded, horizontal stripes, horizontal bands, banding, sash",
      Region("bands", 0.3, 0.22)),
@@ -75,7 +78,8 @@ SHAPES = _table(
     ("studs, rivets, eyelets, grommets, sequins, screws, buttons, knobs, bolts, nails, studded, "
      "riveted", Region("spots", 0.06, 0.07)),
     ("chess board, chessboard, checkerboard pattern, checks, checkered, chequered, checkerboard, squares, check, checked, "
-         "check pattern, chessboard pattern",
+         "check pattern, chessboard pattern, gingham, houndstooth, harlequin, argyle, tattersall, buffalo check, chequerboard, "
+         "checker, chequers",
      Region("checks", 0.5, 0.12)),
     ("water stains, patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, mottled, splashes, "
          "splatters, splattered, "

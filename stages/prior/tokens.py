@@ -37,7 +37,7 @@ FILLER = words(
     "baroque, tileable, seamless, tiling, texture variation, roughness variation, color variation, variation, award winning, "
     "professional, elegant, close up, close-up, macro, hd, uhd, dslr, raw photo, hdr, upright, woven, stitched, crushed, "
     "crumpled, dented in, ripped, torn, frayed, "
-    "wrinkled, down the sides, down the side, down the walls, down its sides, down, slats, slat"
+    "wrinkled, after, down the sides, down the side, down the walls, down its sides, down, slats, slat"
 )
 """Words that say nothing of a material."""
 
@@ -98,7 +98,8 @@ JOINS = {
              "mixed with, splattered with, spattered with, splashed with, stained by, smeared with, mottled with, "
              "patched with"),
     **_joins("spots", "speckled with, dotted with, flecked with, spotted with, sprinkled with"),
-    **_joins("stud", "studded with, riveted with"), **_joins("inlay", "inlaid with, inlaid in, veined with, shot through with"),
+    **_joins("stud", "studded with, riveted with"), **_joins("inlay", "inlaid with, inlaid in, veined with, shot through with, "
+             "repaired with, repaired in, mended with, mended in"),
     **_joins("edge", "edged with, trimmed with, trimmed in, edged in, bordered with, bordered by, framed in, framed by, "
              "framed with"),
     **_joins("rim", "rimmed with, rimmed in"), **_joins("cap", "capped with, capped in"),
@@ -108,7 +109,9 @@ JOINS = {
     **_joins("check", "checkered with, chequered with"),
     **_joins("peel", "peeling off, peeling from, peeling away from, flaking off, flaking from, chipping off, chipped off, "
              "wearing off, "
-             "coming off, chipping away from, peeling over, flaking over, worn off", beneath=True),
+             "coming off, chipping away from, peeling over, flaking over, worn off, crumbling off, crumbling from, "
+             "crumbling away from, falling off, falling from, falling away from, coming away from, breaking off, cracking off, "
+             "rubbed off, rubbing off, scraped off, scratched off, flaking away from, worn away from", beneath=True),
     **_joins("show", "showing, showing through to, revealing, exposing, worn down to, worn away to, chipped down to, "
         "chipped to, rubbed down to, "
              "worn through to, that shows, that reveals, worn to reveal, chipped away to reveal, scraped down to, "
@@ -158,6 +161,7 @@ class Token(NamedTuple):
 
 def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Container[str] = ()) -> list[Token]:
     """Each known phrase, the longest first, and each word that none knows. Args: real: words that are no slips of the pen."""
+    prompt = re.sub(r"\s[-–—]+\s|[–—]", " , ", prompt)  # "rust - a ship"
     plain = unicodedata.normalize("NFKD", prompt.lower()).encode("ascii", "ignore").decode()
     plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
     heard = re.findall(r"#[0-9a-f]{6}\b|[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
@@ -304,6 +308,8 @@ def _resolved(found: list[Token]) -> list[Token]:
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
             continue  # "candy apple red paint"
+        if _holds(token, result, found[number + 1 :]):
+            continue  # "a tin biscuit box"
         if token.text in COLORS and token.kind in ("substance", "thing"):
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)
             if token.text in KNOWN and KNOWN[token.text][0].family != "gem":
@@ -318,6 +324,17 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("part", token.text, PARTS[token.text])
         result.append(token)
     return result
+
+
+FOODS = frozenset(["bread", "cheese", "chocolate", "salt", "meat", "honeycomb", "honey"])
+"""Looks of what is kept in things of other stuffs."""
+
+
+def _holds(token: Token, before: list[Token], after: list[Token]) -> bool:
+    """Whether a name only says what a thing is for, whose own stuff stands before: "enamel bread bin"."""
+    food = token.kind == "substance" and (KNOWN[token.text][0].look in FOODS or token.text in FOODS)
+    named = bool(after) and after[0].kind in ("thing", "unknown", "name")
+    return food and named and any(t.kind == "substance" for t in _run(reversed(before)))
 
 
 def _shades(token: Token, after: list[Token]) -> bool:
