@@ -6,6 +6,7 @@ no table knows, a dictionary may explain by colours; the rest is kept as unknown
 
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.objects import OBJECTS
@@ -200,6 +201,8 @@ def _take(phrase: Phrase, token: Token) -> None:
             said.append(text)
     elif kind == "part" and phrase.thing and phrase.join is FIRST:
         return  # "a bicycle frame" is all frame
+    elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
+        phrase.thing = text  # "striped cushion"
     elif kind in ("part", "shape") and (phrase.region is None or kind == "part"):
         phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
     elif kind == "thing" and not phrase.closed:
@@ -253,7 +256,7 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             phrases[number] = replace(phrase, thing=thing, region=None, where="")  # "a tire"
     if not phrases:
         return []
-    phrases = _marked(_checked(_peeled([each for phrase in phrases for each in _paintings(phrase, phrases)])))
+    phrases = _marked(_checked(_peeled(_painted(phrases))))
     result: list[Phrase] = []
     for number, phrase in enumerate(phrases):
         before = result[-1] if result else None
@@ -269,7 +272,7 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             _add(after.weather, phrase.weather)
         elif before and _only_names(phrase, result):
             body = next((p for p in reversed(result) if p.join.beneath), result[0])
-            body.thing = phrase.thing
+            body.thing = body.thing or phrase.thing
             _add(body.weather, phrase.weather)
         elif before and phrase.join.kind == "show":
             _show(result, phrase)
@@ -310,7 +313,15 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
 def _only_names(phrase: Phrase, before: list[Phrase]) -> bool:
     """Whether a phrase after a comma only says what thing has the stuffs before it: "chrome flaking off brass, a faucet"."""
     alone = phrase.thing and not (phrase.substance or phrase.colors or phrase.unknown or phrase.animal)
-    return bool(alone) and phrase.join.kind == "comma" and all(p.substance and not p.thing for p in before)
+    return bool(alone) and phrase.join.kind == "comma" and all(p.substance for p in before)
+
+
+def _painted(phrases: list[Phrase]) -> list[Phrase]:
+    """Phrases, with the paints of each pattern of several; "graffiti on a train" names them before what they are on."""
+    if len(phrases) > 1 and phrases[0].where in PAINTS and phrases[1].join.kind == "on":
+        first, ground, *rest = phrases
+        phrases = [replace(ground, join=FIRST), replace(first, join=Join("with")), *rest]
+    return [each for phrase in phrases for each in _paintings(phrase, phrases)]
 
 
 PAINTS = {"kintsugi": ("gold", [""]), "graffiti": ("spray paint", ["blue", "red", "yellow"])}
@@ -342,6 +353,15 @@ CLOTHS = {"gingham": "red", "houndstooth": "black", "argyle": "green", "tattersa
 def _checked(phrases: list[Phrase]) -> list[Phrase]:
     """Checks of cloth are of two colours, named before or after them, white being the other: "gingham, blue and white"."""
     first, *rest = phrases
+    if _plaid(first) and not first.region:
+        first = replace(first, region=SHAPES["checks"], where="checks")
+    for before, phrase in pairwise(phrases):
+        if before.color_only and phrase.join.kind == "and" and _plaid(phrase) and not phrase.region:
+            phrase.region, phrase.where = SHAPES["checks"], "checks"  # "red and black plaid"
+        elif phrase.where == "lines" and _plaid(before):
+            phrase.region, phrase.where = SHAPES["stripes"]._replace(share=0.15), "stripes"
+            crossing = replace(phrase, join=Join("with"), region=SHAPES["bands"]._replace(share=0.15), where="bands")
+            return [*phrases, crossing]  # "green tartan, red lines"
     for phrase in phrases:
         if phrase.where in CLOTHS and not (phrase.substance or phrase.thing):
             phrase.substance = "fabric"
@@ -356,6 +376,10 @@ def _checked(phrases: list[Phrase]) -> list[Phrase]:
         return phrases
     marks = Phrase(Join("with"), colors=other, region=first.region, where=first.where)
     return [replace(first, colors=one, region=None, where="", placed=False), marks, *rest]
+
+
+def _plaid(phrase: Phrase) -> bool:
+    return bool(phrase.substance) and KNOWN[phrase.substance][0].look == "tartan"
 
 
 UNDERNEATH = ("underneath", "beneath", "below", "under")
@@ -385,15 +409,26 @@ def _peeled(phrases: list[Phrase]) -> list[Phrase]:
     return phrases
 
 
+def _coat_of(animal: str) -> str:
+    return "glossy plastic" if animal in SHELLED else "cotton" if animal in PRINTED else "fur"
+
+
 def _marked(phrases: list[Phrase]) -> list[Phrase]:
     """An animal's marks in colours that words name, on a ground of its own stuff: "zebra stripes, pink and purple"."""
     first, *rest = phrases
+    after = rest[0] if rest else Phrase()
+    if first.color_only and after.animal and after.join.kind == "and":
+        first.substance = _coat_of(after.animal)  # "pink and purple leopard print"
+    elif first.animal and any(map(is_hue, first.colors)) and after.color_only and after.join.kind == "and" and not after.region:
+        ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), region=None, where="")
+        return [ground, replace(first, join=Join("with"), colors=after.colors), *rest[1:]]  # "zebra print in pink and black"
     if not first.animal or first.colors or first.substance or not rest or rest[0].region:
         return phrases
-    coat = "glossy plastic" if first.animal in SHELLED else "cotton" if first.animal in PRINTED else "fur"
-    if rest[0].join.kind == "on" and rest[0].color_only:
+    coat = _coat_of(first.animal)
+    pair = len(rest) > 1 and rest[1].color_only and rest[1].join.kind == "and" and not rest[1].region
+    if rest[0].join.kind == "on" and rest[0].color_only and not pair:
         rest[0].substance = coat  # "leopard spots on tan"
-    elif len(rest) > 1 and rest[0].color_only and rest[0].join.kind in ("comma", "in", "with") and not rest[1].region:
+    elif len(rest) > 1 and rest[0].color_only and rest[0].join.kind in ("comma", "on", "with") and not rest[1].region:
         one, other = rest[:2]
         if other.join.kind not in ("and", "on") or not (other.color_only or other.join.kind == "on"):
             return phrases
@@ -499,8 +534,12 @@ def _on_ground(phrases: list[Phrase]) -> list[Phrase]:
         return phrases
     one, other, ground, *rest = phrases
     both = one.color_only and other.color_only and not one.region and other.where in SHAPES and other.join.kind == "and"
-    if not both or ground.join.kind != "on" or not ground.substance or ground.region or any(map(is_hue, ground.colors)):
+    if not both or ground.join.kind != "on" or not ground.substance or ground.region:
         return phrases
+    if any(map(is_hue, ground.colors)) and other.region:  # "on white wood"
+        one = replace(one, join=Join("with"), region=other.region._replace(share=min(0.8, 1.3 * other.region.share)))
+        other = replace(other, region=other.region._replace(share=0.6 * other.region.share))
+        return [replace(ground, join=FIRST), replace(one, where=other.where), other, *rest]
     name = "paint" if ground.metal else ground.substance
     return [replace(p, substance=name, boards=ground.boards, thing=ground.thing) for p in (one, other)] + rest
 

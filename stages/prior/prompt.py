@@ -385,6 +385,11 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
         largest = max(parts, key=lambda p: p.region.share if p.region else 0.0)
         if largest is not first and first.region and first.region.share < LARGE:
             first, over = largest, [p for p in parts if p is not largest]
+    if first.thing and not (first.substance or first.region) and all(p.where in PARTS and p.substance for p in over):
+        frame = next((p for p in over if p.where in FRAMES), None)
+        if frame and any(p.where in SEATS for p in over):  # "a chair: oak frame, velvet seat"
+            whole = replace(frame, thing=first.thing, region=None, where="", join=first.join)
+            return whole, [p for p in over if p is not frame]
     body = next((k for k, p in enumerate(over) if p.region and p.region.kind == "all" and p.says_what), None)
     if body is not None:
         thing = first.thing
@@ -437,6 +442,9 @@ def _gaudy(phrase: Phrase) -> bool:
     _, *chroma = to_oklab(srgb_decode(np.array(_color(phrase)))[:, None])[:, 0]
     return bool(np.hypot(*chroma) > GREYISH and (chroma[1] < 0.6 * np.hypot(*chroma)))
 
+
+FRAMES, SEATS = ("frame", "framework"), ("seat", "cushion", "cushions", "upholstery", "backrest")
+"""Parts of furniture: what the rest of it is made like, and what lies on that."""
 
 SOFT = ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching")
 """Parts that are of cloth where words name their colour alone."""

@@ -111,7 +111,8 @@ JOINS = {
              "wearing off, "
              "coming off, chipping away from, peeling over, flaking over, worn off, crumbling off, crumbling from, "
              "crumbling away from, falling off, falling from, falling away from, coming away from, breaking off, cracking off, "
-             "rubbed off, rubbing off, scraped off, scratched off, flaking away from, worn away from", beneath=True),
+             "rubbed off, rubbing off, scraped off, scratched off, flaking away from, worn away from, "
+             "fallen off, crumbled off, broken off, peeled off, flaked off, rubbed away from", beneath=True),
     **_joins("show", "showing, showing through to, revealing, exposing, worn down to, worn away to, chipped down to, "
         "chipped to, rubbed down to, "
              "worn through to, that shows, that reveals, worn to reveal, chipped away to reveal, scraped down to, "
