@@ -36,7 +36,7 @@ OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" 
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test campaign hostile uvs lint asset batch export bench beside clean
+.PHONY: help setup demo test campaign hostile uvs lint asset batch export docs bench beside clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -117,6 +117,12 @@ uvs: $(VENV)/.ready | $(CYCLES)  ## models laid out in fifteen ways: UVs kept bi
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .
 	$(RUN)/mypy
+
+docs: $(VENV)/.ready  ## the pages as a site in .site; a dead link is an error
+	$(INSTALL) --editable '.[docs]'
+	$(RUN)/python docs/reference.py
+	$(RUN)/mkdocs build --strict --quiet
+	@echo "look at .site/index.html"
 
 bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light transport, beside Mitsuba 3 and Cycles
 	$(DREAMMAT) prep $< -o demo/prep.npz

@@ -1,0 +1,1 @@
+"""What an asset folder is: its files and their writers; export to other programs; report.html."""

@@ -1,0 +1,1 @@
+"""Stage 4: textures, model, preview and report."""

@@ -1,0 +1,1 @@
+"""Stage 2: cameras, and depth, normals and light transport for each."""

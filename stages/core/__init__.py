@@ -1,0 +1,1 @@
+"""Artefact files, BRDF, shading, colour, frames, threads, errors. Imports nothing of ours."""

@@ -1,0 +1,1 @@
+"""Rays, environments, light transport; `reference.py` is the slow, obvious form of `transport.py`."""

@@ -1,0 +1,1 @@
+"""Prompts read as recipes (grammar, tables), and the embedded diffusion model with its weights."""

@@ -1,0 +1,1 @@
+"""Stable Diffusion and its ControlNet: files, conventions, loading. Needs the extra `sd`."""

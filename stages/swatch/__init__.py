@@ -1,0 +1,1 @@
+"""A material from words alone, without a mesh."""

@@ -1,0 +1,1 @@
+"""Makes data and weights of the prior and of the ControlNet."""
