@@ -35,7 +35,7 @@ def map_of_the_house() -> str:
     rows = [f"| `{room}` | {holds(room)} |" for room in ordered(uses)]
     arrows = [f"    {room} --> {other}" for room in ordered(uses) for other in sorted(direct(room, uses))]
     head = "One folder of `stages/` is one room. `dreammat_cli/` has a file for each command, which parses, calls and prints."
-    text = "An arrow means *imports*; what follows along arrows is left out. `tests/test_architecture.py` holds imports to this."
+    text = "An arrow means *imports*; what follows along arrows is left out. `tests/test_architecture.py` holds imports to it."
     table = ["| room | holds |", "|---|---|", *rows]
     diagram = ["```mermaid", "graph TD", *arrows, "```"]
     return "\n".join(["# Map of the house", "", head, "", *table, "", text, "", *diagram]) + "\n"

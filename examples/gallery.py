@@ -1,6 +1,6 @@
 """Textures six public meshes and puts them in one picture: python examples/gallery.py MESHES OUT.jpg
 
-MESHES holds the files named below, fetched from their repositories on GitHub. What is made stays beside OUT, so that another run
+MESHES holds the files named below, fetched from their repositories on GitHub. What is made stays beside OUT, so another run
 is quick.
 """
 
