@@ -4,6 +4,7 @@ A set is a folder of maps (ambientCG: `Bark014_1K-PNG_Color.png`) or files that 
 `rust_coarse_01_diff_1k.jpg`). A set that is used becomes one more look, named by the set and by the hash of its files, so
 that a recipe that was read with it is never shown with another. """
 
+import hashlib
 import re
 from dataclasses import dataclass
 from functools import cached_property
@@ -62,8 +63,9 @@ class ScannedSet:
 
     @property
     def look(self) -> str:
-        """The name of its look: the set's, and eight digits of the hash of its colours."""
-        return f"{self.name} {self.hashes[self.maps['color'].name][:8]}"
+        """The name of its look: the set's, and eight digits of a hash of all its maps."""
+        maps = "".join(f"{role} {self.hashes[path.name]} " for role, path in sorted(self.maps.items()))
+        return f"{self.name} {hashlib.sha256(maps.encode()).hexdigest()[:8]}"
 
     def described(self) -> dict[str, Any]:
         """What a manifest says of it."""

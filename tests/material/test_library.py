@@ -1,6 +1,7 @@
 """Scanned materials: found in both layouts, laid without seams or repetition, with their own histogram at any footprint."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -82,6 +83,14 @@ def place(count: int, metres: float, footprint: float, period: float = 0.0) -> P
     points = np.stack([u, v, 0 * u])
     size = np.full(len(u), footprint, np.float32)
     return Place(points, points[:2], np.zeros(len(u), np.int32), size, (period, period, 0.0), 3)
+
+
+def test_another_roughness_is_another_look(library: Path, tmp_path: Path) -> None:
+    shutil.copytree(library, tmp_path / "copy")
+    found = Library(tmp_path / "copy").sets["Bark014"]
+    assert found.look == Library(library).sets["Bark014"].look
+    shutil.copy(found.maps["color"], found.maps["roughness"])
+    assert Library(tmp_path / "copy").sets["Bark014"].look != found.look
 
 
 def test_a_scan_keeps_its_histogram_and_never_repeats(library: Path) -> None:

@@ -3,7 +3,8 @@
 where: a kind of mask, or several that would do ("up/patches"); "all" is the base. family: of the look ("*": any; "metal" alone
 is metallic). colour: sRGB. What a prompt calls for beyond this, such as grime, is not asked. FORMS were written as a user
 writes, before the tables were looked at for them; WORDS are single things, stuffs, finishes and wear. corpus.txt has
-prompts as artists, makers of games and researchers write them, of every form; each of its rows was judged by eye.
+prompts as artists, makers of games and researchers write them, of every form: its rows are what the reader gave, read through,
+and those left out that were wrong. They hold what is right today; they do not measure how often new prompts are.
 """
 
 from pathlib import Path
