@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.objects import OBJECTS
-from stages.prior.places import GATHERS, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
+from stages.prior.places import ANIMALS, GATHERS, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
 from stages.prior.stuffs import BOARDS, COATINGS, GENERIC, KNOWN, PATTERNED, ROOFS
 from stages.prior.tokens import Join, Token, singulars, tokens_of
 
@@ -370,11 +370,13 @@ def _checked(phrases: list[Phrase]) -> list[Phrase]:
     pair = len(rest) > 1 and all(p.color_only and not p.region for p in rest[:2]) and rest[1].join.kind == "and"
     if pair and not first.colors and rest[0].join.kind in ("comma", "in"):
         one, other, rest = rest[0].colors, rest[1].colors, rest[2:]
+    elif first.where in ("chequered", "checkered") and not (rest or first.colors or first.metal):
+        one, other = ["black"], ["white"]
     elif first.where in CLOTHS and not (rest and rest[0].color_only):
         one, other = first.colors or [CLOTHS[first.where]], ["white"]
     else:
         return phrases
-    marks = Phrase(Join("with"), colors=other, region=first.region, where=first.where)
+    marks = Phrase(Join("with"), first.substance, first.boards, other, region=first.region, where=first.where)
     return [replace(first, colors=one, region=None, where="", placed=False), marks, *rest]
 
 
@@ -383,6 +385,8 @@ def _plaid(phrase: Phrase) -> bool:
 
 
 UNDERNEATH = ("underneath", "beneath", "below", "under")
+BROKEN = SHOWS | {"cracked", "cracking"}
+"""Words of wear that let see what is underneath a coat."""
 
 
 def _peeled(phrases: list[Phrase]) -> list[Phrase]:
@@ -392,7 +396,7 @@ def _peeled(phrases: list[Phrase]) -> list[Phrase]:
             continue
         before = phrases[:number]
         off = next((p for p in before if p.join.kind == "peel"), None)
-        coat = next((p for p in before if set(p.weather) & PEELS), None)
+        coat = next((p for p in before if set(p.weather) & (PEELS | BROKEN if p.coats else PEELS)), None)
         if off:  # "bark peeling off a log, pale wood underneath"
             off.substance, off.colors, off.thing = phrase.substance or off.substance, phrase.colors, ""
             return [*before, *phrases[number + 1 :]]
@@ -422,6 +426,10 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
     elif first.animal and any(map(is_hue, first.colors)) and after.color_only and after.join.kind == "and" and not after.region:
         ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), region=None, where="")
         return [ground, replace(first, join=Join("with"), colors=after.colors), *rest[1:]]  # "zebra print in pink and black"
+    elif first.animal and after.color_only and after.join.kind == "with" and after.where in SHAPES:
+        colors = first.colors or [ANIMALS[first.animal][0]]  # "a brown cow with white patches"
+        ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), colors=colors)
+        return [ground, replace(after, animal=first.animal, region=None, where=""), *rest[1:]]
     if not first.animal or first.colors or first.substance or not rest or rest[0].region:
         return phrases
     coat = _coat_of(first.animal)
