@@ -276,7 +276,9 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             _add(body.weather, phrase.weather)
         elif before and phrase.join.kind == "show":
             _show(result, phrase)
-        elif before and phrase.join.kind == "through" and phrase.says_what and not phrase.region:
+        elif before and phrase.join.kind == "through" and phrase.says_what and (not phrase.region or _there(phrase)):
+            if phrase.region:  # "rust showing through white paint at the edges"
+                before.region, before.where, phrase.region, phrase.where = phrase.region, phrase.where, None, ""
             result[-1] = _covering(before, phrase)
         elif before and phrase.join.kind == "paint" and not (before.region or phrase.region) and before.says_what:
             phrase.join, phrase.thing = before.join, phrase.thing or before.thing
@@ -384,6 +386,12 @@ def _plaid(phrase: Phrase) -> bool:
     return bool(phrase.substance) and KNOWN[phrase.substance][0].look == "tartan"
 
 
+def _there(phrase: Phrase) -> bool:
+    """Whether a phrase ends with where something of it is: "at the edges"."""
+    edges = phrase.region is not None and phrase.region.kind == "edges"
+    return edges and phrase.where.startswith(("at ", "on ", "along ", "around "))
+
+
 UNDERNEATH = ("underneath", "beneath", "below", "under")
 BROKEN = SHOWS | {"cracked", "cracking"}
 """Words of wear that let see what is underneath a coat."""
@@ -392,6 +400,8 @@ BROKEN = SHOWS | {"cracked", "cracking"}
 def _peeled(phrases: list[Phrase]) -> list[Phrase]:
     """What lies underneath a coat that peels is what it peels off; what gathers on top lies on what is underneath it."""
     for number, phrase in enumerate(phrases[1:], 1):
+        if phrase.coats and _there(phrase) and any(word in SHOWS for word in phrase.weather):
+            phrase.region, phrase.where = None, ""  # "a safe, green enamel worn away at the corners"
         if phrase.where not in UNDERNEATH or not phrase.says_what:
             continue
         before = phrases[:number]
@@ -541,15 +551,16 @@ def _on_ground(phrases: list[Phrase]) -> list[Phrase]:
     if len(phrases) < 3:
         return phrases
     one, other, ground, *rest = phrases
-    both = one.color_only and other.color_only and not one.region and other.where in SHAPES and other.join.kind == "and"
-    if not both or ground.join.kind != "on" or not ground.substance or ground.region:
+    both = one.color_only and not one.region and (other.color_only or other.metal) and other.where in SHAPES
+    if not both or other.join.kind != "and" or ground.join.kind != "on" or not ground.substance or ground.region:
         return phrases
     if any(map(is_hue, ground.colors)) and other.region:  # "on white wood"
         one = replace(one, join=Join("with"), region=other.region._replace(share=min(0.8, 1.3 * other.region.share)))
         other = replace(other, region=other.region._replace(share=0.6 * other.region.share))
         return [replace(ground, join=FIRST), replace(one, where=other.where), other, *rest]
     name = "paint" if ground.metal else ground.substance
-    return [replace(p, substance=name, boards=ground.boards, thing=ground.thing) for p in (one, other)] + rest
+    laid = [replace(p, substance=p.substance or name, boards=ground.boards, thing=ground.thing) for p in (one, other)]
+    return [*laid, *rest]
 
 
 def _in_pairs(phrases: list[Phrase]) -> list[Phrase]:
