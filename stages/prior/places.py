@@ -68,9 +68,10 @@ TABLE_PARTS = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat
 """Parts of furniture, which lie elsewhere than in other things."""
 
 SHAPES = _table(
-    ("zigzag, zigzags, chevrons, stripes, stripe, striped, pinstripes, vertical stripes, diagonal stripes, "
+    ("zigzag, zigzags, chevrons, stripes, stripe, striped, vertical stripes, diagonal stripes, "
          "racing stripes, racing stripe, hazard stripes, warning stripes",
      Region("stripes", 0.5, 0.14)),
+    ("pinstripes, pinstripe, pinstriped, thin stripes, narrow stripes, fine stripes", Region("stripes", 0.12, 0.08)),
     ("bands, band, hoops, rings, ring, straps, strap, belts, belt, banded, horizontal stripes, horizontal bands, banding, sash",
      Region("bands", 0.3, 0.22)),
     ("spots, spot, dots, polka dots, polka, spotted, dotted, speckles, freckles, flecks, speckled, flecked, polka-dotted",
