@@ -27,12 +27,16 @@ LARGE = 4_000_000
 """Bytes above which a mesh is left to a run by hand; the largest takes a minute and a half in `prep` alone."""
 
 
+SLOW = 20_000
+"""Triangles above which xatlas takes longer than all the rest."""
+
+
 @pytest.mark.skipif(not MESHES, reason="the optional assets are not beside the project")
 @pytest.mark.parametrize("mesh", [p for p in MESHES if p.stat().st_size < LARGE], ids=lambda p: p.stem)
 def test_real_mesh_through_all_stages(mesh: Path, tmp_path: Path) -> None:
     prepared, folder = tmp_path / "prep.npz", tmp_path / "conditions"
     material, asset = tmp_path / "material.npz", tmp_path / "asset"
-    prep(mesh, prepared, PrepOptions(texture_size=512, padding=4, unwrap_seconds=20))
+    prep(mesh, prepared, PrepOptions(texture_size=512, padding=4, unwrap_triangles=SLOW))
     few = ConditionsOptions(views=3, size=48, env=("overcast", "studio"), quality="draft")
     conditions(prepared, folder, few)
     distill(folder, material, DistillOptions(prompt="worn red plastic", steps=4))
