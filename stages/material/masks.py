@@ -119,10 +119,18 @@ def _veins(mask: Mask, at: Place) -> Array:
     return -np.minimum(near, 4 * twig + 0.5 * near + np.float32(0.003 * size)).astype(np.float32)
 
 
+def _quantile(value: Array, weight: Array, share: float) -> float:
+    """The least value that a share of all weight does not exceed. Args: (P,) each."""
+    order = np.argsort(value, kind="stable")
+    below = np.cumsum(weight[order], dtype=np.float64)
+    return float(value[order[min(np.searchsorted(below, share * below[-1]), len(order) - 1)]])
+
+
 def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
-    """The recipe with each mask's level set so that it covers its share of this surface. Args: surface: evenly spread
-    points."""
+    """The recipe with each mask's level set so that it covers its share of what this surface shows: a vessel's inside, which
+    the sky hardly sees, is not where all crevices are. Args: surface: evenly spread points."""
     uv, face = along(pieces, surface.piece, surface.point, surface.normal)
+    shown = np.maximum(1 - surface.occlusion, 0.02)
     all_seen = np.full(len(surface), np.float32(1e-4))  # a level is that of the whole noise
     world = Place(np.ascontiguousarray(surface.point.T), uv, face, all_seen, seed=recipe.seed)
 
@@ -135,7 +143,7 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
         if mask.kind in SIDES:  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())
             return replace(mask, level=high - mask.share * (high - low))
-        level = float(np.quantile(value, 1 - np.clip(mask.share, 0, 1)))
+        level = _quantile(value, shown, 1 - float(np.clip(mask.share, 0, 1)))
         return replace(mask, level=max(level, LEAST.get(mask.kind, level)))
 
     def layer(old: Layer, number: int) -> Layer:

@@ -1,5 +1,7 @@
 """Where layers lie: veins, fades and sides. The plate is a square of edge 1 that stands upright, seen from its front."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -35,6 +37,23 @@ def test_veins_cover_their_share_thinly_and_crisply() -> None:
     inside = whole > 0.5
     eroded = inside[4:-4, 4:-4] & inside[8:, 4:-4] & inside[:-8, 4:-4] & inside[4:-4, 8:] & inside[4:-4, :-8]
     assert eroded.sum() < 0.25 * inside.sum()
+
+
+def test_a_share_is_one_of_what_shows() -> None:
+    """A vessel's inside hides more than any crease outside, and would take the whole share of crevices."""
+    count = 4_000
+    dice = np.random.default_rng(0)
+    inside = np.arange(count) < count // 3
+    occlusion = np.where(inside, dice.uniform(0.93, 0.99, count), dice.uniform(0, 0.5, count)).astype(np.float32)
+    point = dice.uniform(-0.5, 0.5, (count, 3)).astype(np.float32)
+    bare = Surface.bare(point, np.tile(np.float32([0, 0, 1]), (count, 1)), 1e-3)
+    surface = replace(bare, occlusion=occlusion)
+    mask = Mask("crevices", 0.22, wear=0.0)
+    recipe = settled(Recipe(Coat("even"), (Layer(Coat("rust"), (mask,)),)), surface)
+    place = Place(np.ascontiguousarray(point.T), np.zeros((2, count), np.float32), np.zeros(count, np.int32), surface.footprint)
+    cover = coverage(recipe.layers[0].masks, surface, place)
+    assert cover[inside].mean() > 0.99
+    assert 0.1 < cover[~inside].mean() < 0.3
 
 
 def test_a_fade_rises_from_nothing_to_all() -> None:
