@@ -12,7 +12,7 @@ import click
 from stages.core.errors import DreammatError
 
 COMMANDS = {
-    "run": "Texture a mesh: the next four commands in one call.",
+    "run": "Texture a mesh: prep, conditions, distill and bake in one call.",
     "prep": "Read, check, mend and unwrap a mesh.",
     "parts": "List the parts of a prepared mesh by name, and draw them.",
     "conditions": "Ray-trace geometry and light around the mesh.",
