@@ -13,13 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.material import noise_kernels as kernels
-from stages.material.noise_kernels import Period, Strokes
+from stages.material import scatter_kernels as scattered
+from stages.material.noise_kernels import Octave, Period, Shape
 from stages.material.place import Axes, Place
+from stages.material.scatter_kernels import Strokes
 
 Array = NDArray[Any]
 """float32, or what it was mixed with."""
 
 SQUARE: Axes = (1.0, 1.0, 1.0)
+
+NONE = np.empty(0, np.float32)
+"""No envelope."""
 
 
 class Spectrum(NamedTuple):
@@ -67,20 +72,19 @@ def _lattice(at: Place, wavelength: float, stretch: Axes) -> tuple[Axes, Period]
     return (scale[0], scale[1], scale[2]), Period(*map(float, counts))
 
 
+def _octave(at: Place, size: float, seed: int, stretch: Axes, strength: float = 1.0) -> Octave:
+    """An octave of a wavelength along the axes that are not stretched."""
+    number = seed_of(at, seed)
+    x, y, z = (float(number >> s & 255) / 256 + 0.37 for s in (0, 8, 16))
+    seen = math.log2(size * min(stretch))
+    return Octave(*_lattice(at, size, stretch), (x, y, z), number, seen, math.log2(size), strength)
+
+
 def noise(at: Place, size: float, seed: int = 0, stretch: Axes = SQUARE) -> Array:
     """One octave of gradient noise, mean 0, deviation 1 where the footprint lets it be seen. Returns: (P,)."""
-    return _octave(at, size, seed, stretch) * fading(size * min(stretch), at.footprint)
-
-
-def _octave(at: Place, size: float, seed: int, stretch: Axes) -> Array:
-    """`noise` as if all of it could be seen."""
-    out = np.empty(len(at), np.float32)
-    scale, period = _lattice(at, size, stretch)
-    number = seed_of(at, seed)
-    shift = tuple(float(number >> s & 255) / 256 + 0.37 for s in (0, 8, 16))
-    x, y, z = at.p
-    kernels.gradient_noise(x, y, z, scale, shift, period, number, out)
-    return out
+    total = np.zeros(len(at), np.float32)
+    kernels.add_octave(*at.p, _octave(at, size, seed, stretch), np.log2(at.footprint), NONE, Shape(0.0, 0.0), total)
+    return total
 
 
 def fbm(at: Place, spectrum: Spectrum, seed: int = 0) -> Array:
@@ -89,18 +93,15 @@ def fbm(at: Place, spectrum: Spectrum, seed: int = 0) -> Array:
     spread = math.sqrt(1 + 2 * t * 1.596 + 3 * t * t + 2 * s * s)
     thinnest = float(at.footprint.min()) if len(at) else 1.0
     total, level = np.zeros(len(at), np.float32), np.log2(at.footprint)
-    envelope = np.exp(spectrum.patch * noise(at, 3 * spectrum.size, seed + 977, spectrum.stretch)) if spectrum.patch else None
+    envelope = NONE
+    if spectrum.patch:
+        envelope = np.exp(np.float32(spectrum.patch) * noise(at, 3 * spectrum.size, seed + 977, spectrum.stretch))
     for k, strength in enumerate(spectrum.strengths()):
         size = spectrum.size / 2**k
         if size * min(spectrum.stretch) <= thinnest:
             break
-        octave = _octave(at, size, seed * 31 + k, spectrum.stretch)
-        octave *= np.clip(np.float32(math.log2(size * min(spectrum.stretch))) - level, 0, 1)  # `fading`
-        if t or s:
-            octave = (octave * (1 + t * abs(octave)) + s * (octave * octave - fading(size, at.footprint) ** 2)) / spread
-        if envelope is not None and k >= 1:
-            octave = octave * envelope
-        total += np.float32(strength) * octave
+        octave = _octave(at, size, seed * 31 + k, spectrum.stretch, strength / spread)
+        kernels.add_octave(*at.p, octave, level, envelope if k else NONE, Shape(t, s), total)
     return total
 
 
@@ -174,10 +175,10 @@ def cells(at: Place, size: float, seed: int = 0, jitter: float = 1.0, stretch: A
     Cells smaller than the footprint must be faded by the caller, with `fading(size, at.footprint)`.
     """
     scale, period = _lattice(at, size, stretch)
-    x, y, z = (np.ascontiguousarray(axis * np.float32(s)) for axis, s in zip(at.p, scale, strict=True))
+    x, y, z = (np.ascontiguousarray(axis * np.float32(s), np.float32) for axis, s in zip(at.p, scale, strict=True))
     near, second, border = (np.empty(len(at), np.float32) for _ in range(3))
     ident, offset = np.empty(len(at), np.uint32), np.empty((3, len(at)), np.float32)
-    kernels.worley(x, y, z, period, jitter, seed_of(at, seed), near, second, border, ident, offset)
+    scattered.worley(x, y, z, period, jitter, seed_of(at, seed), near, second, border, ident, offset)
     unit = np.float32(size)
     return Cells(near * unit, second * unit, border * unit, ident, offset * unit, size)
 
@@ -233,13 +234,13 @@ def marks(
     """
     flat = at.flat
     scale, period = _lattice(flat, length, SQUARE)
-    x, y = (np.ascontiguousarray(axis * np.float32(s)) for axis, s in zip(at.uv, scale, strict=False))
+    x, y = (np.ascontiguousarray(axis * np.float32(s), np.float32) for axis, s in zip(at.uv, scale, strict=False))
     half = max(width, 1e-7) / 2 / length
     reach = half + float(at.footprint.max(initial=0)) / length  # a thin stroke is seen a footprint away
     shape = Strokes(count, 0.5, vary, min(reach, 0.45), angle, spread, bend)
     distance, along = np.empty(len(at), np.float32), np.empty(len(at), np.float32)
     ident = np.empty(len(at), np.uint32)
-    kernels.strokes(x, y, at.face, period, shape, seed_of(at, seed), distance, along, ident)
+    scattered.strokes(x, y, at.face, period, shape, seed_of(at, seed), distance, along, ident)
     here = distance < 8
     own = np.float32(width / 2) * np.sqrt(np.clip(1 - along * along, 0, 1))
     cover = np.where(here, line(distance * np.float32(length), own, at.footprint), 0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from stages.material import patterns
-from stages.material.noise_kernels import GRADIENT_SCALE, Period, corner, gradient_noise, slope_at, unit
+from stages.material.noise_kernels import GRADIENT_SCALE, Octave, Period, Shape, add_octave, corner, slope_at, unit
 from stages.material.patterns import Spectrum, cells, edge, fbm, line, lost, marks, masked, noise, spots, tiles, weave
 from stages.material.place import Place
 from tests.material.places import square
@@ -16,8 +16,9 @@ def test_noise_is_what_a_plain_reading_of_perlin_says() -> None:
     """The compiled loop against one point after the other, corner by corner."""
     rng = np.random.default_rng(0)
     x, y, z = rng.uniform(-20, 20, (3, 200)).astype(np.float32)
-    found = np.empty(200, np.float32)
-    gradient_noise(x, y, z, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), Period(0.0, 0.0, 0.0), np.uint32(5), found)
+    found, fine, even = np.zeros(200, np.float32), np.full(200, -20, np.float32), np.empty(0, np.float32)
+    octave = Octave((1.0, 1.0, 1.0), Period(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.uint32(5), 0.0, 0.0, 1.0)
+    add_octave(x, y, z, octave, fine, even, Shape(0.0, 0.0), found)
 
     def plain(p: np.ndarray) -> float:
         cell = np.floor(p)
@@ -122,6 +123,25 @@ def test_cells_are_worley_s() -> None:
     near = found.border > 0.01
     assert len(np.unique(found.random(1)[near])) > 60
     assert abs(found.random(1).mean() - 0.5) < 0.1 and abs(np.corrcoef(found.random(1), found.random(2))[0, 1]) < 0.2
+
+
+@pytest.mark.parametrize("around", [200, 30, 8, 2])
+def test_neighbours_in_a_row_are_told_what_each_is_told_alone(around: int) -> None:
+    """Cells and strokes draw what is near once for points of one cell; in any other order they are told the same."""
+    count = 4000
+    across = (np.arange(count) / (around * 20)).astype(np.float32)
+    row = Place(np.stack([across, 0 * across + 0.31, 0.2 * across]), np.stack([across, across]), np.zeros(count, np.int32),
+                np.full(count, 1e-3, np.float32))  # fmt: skip
+    order = np.random.default_rng(1).permutation(count)
+    for jitter in (0.6, 1.0):
+        together, alone = cells(row, 0.05, 3, jitter), cells(row[order], 0.05, 3, jitter)
+        np.testing.assert_array_equal(together.ident[order], alone.ident)
+        np.testing.assert_allclose(together.border[order], alone.border, atol=1e-6)
+        np.testing.assert_allclose(together.offset[:, order], alone.offset, atol=1e-7)
+    lain, each = (marks(at, 0.05, 0.006, 8, 0.3, 2 * np.pi, 5, 0.5, 0.3) for at in (row, row[order]))
+    assert (lain.cover > 0.5).mean() > 0.2
+    np.testing.assert_array_equal(lain.ident[order], each.ident)
+    np.testing.assert_allclose(lain.across[order], each.across, atol=1e-4)
 
 
 def test_strokes_have_the_direction_and_width_they_are_given() -> None:
