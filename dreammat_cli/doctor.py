@@ -194,11 +194,11 @@ def write_and_read() -> str:
 def compile_kernel() -> str:
     """A kernel through numba. Returns: whether machine code is kept for later runs."""
     from stages.core.parallel import compiled
-    from stages.material.noise_kernels import gradient_noise
+    from stages.material.noise_kernels import add_octave
 
     if compiled(_double)(1.5) != 3:
         raise ArithmeticError("a compiled kernel is wrong")
-    kept = gradient_noise.stats.cache_path
+    kept = add_octave.stats.cache_path
     if kept is None or not os.access(kept, os.W_OK):
         return f"kernels compile, but once more in every process: {kept or 'no folder'} to keep them in; set NUMBA_CACHE_DIR"
     return "kernels compile, and are kept for later runs"

@@ -82,8 +82,8 @@ def _octave(at: Place, size: float, seed: int, stretch: Axes, strength: float = 
 
 def noise(at: Place, size: float, seed: int = 0, stretch: Axes = SQUARE) -> Array:
     """One octave of gradient noise, mean 0, deviation 1 where the footprint lets it be seen. Returns: (P,)."""
-    total = np.zeros(len(at), np.float32)
-    kernels.add_octave(*at.p, _octave(at, size, seed, stretch), np.log2(at.footprint), NONE, Shape(0.0, 0.0), total)
+    total, octave = np.zeros(len(at), np.float32), _octave(at, size, seed, stretch)
+    kernels.add_octave(at.p[0], at.p[1], at.p[2], octave, np.log2(at.footprint), NONE, Shape(0.0, 0.0), total)
     return total
 
 
@@ -101,7 +101,7 @@ def fbm(at: Place, spectrum: Spectrum, seed: int = 0) -> Array:
         if size * min(spectrum.stretch) <= thinnest:
             break
         octave = _octave(at, size, seed * 31 + k, spectrum.stretch, strength / spread)
-        kernels.add_octave(*at.p, octave, level, envelope if k else NONE, Shape(t, s), total)
+        kernels.add_octave(at.p[0], at.p[1], at.p[2], octave, level, envelope if k else NONE, Shape(t, s), total)
     return total
 
 
