@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from stages.core.artifact import Provenance, save_npz
 from stages.core.schemas import PREP
+from stages.core.texture_sets import TextureSet
 from stages.prep.source import nothing_passed_on
 
 
@@ -34,10 +35,12 @@ def save_prep(path: Path, vertices: NDArray, triangles: NDArray, normals: NDArra
         "source_images": np.zeros(0, np.uint8),
         "face_part": np.zeros(count, np.int32),
         "face_group": np.full(count, -1, np.int32),
+        "face_set": np.zeros(count, np.int32),
         "loop_uv": np.zeros((3 * count, 2), np.float32),
     }
     part = {"name": "mesh", "material": "material", "node": "mesh", "transform": np.eye(4).ravel().tolist()}
     extra = {"source_format": "obj", "source_name": "mesh", "uv_kept": False, "parts": [part], "groups": []}
+    extra |= {"sets": [TextureSet().to_json()]}
     extra |= {"shared_texels": False, "passed_on": nothing_passed_on(), "findings": {}}
     save_npz(path, PREP, arrays, Provenance({}, None, {"mesh": seed or "0" * 64}, extra))
     return path

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.asset.folder import Asset, identifier, unique
+from stages.asset.folder import Asset
 from stages.asset.pictures import copy_model, copy_picture, write_pixels
 from stages.asset.read_glb import Look, Primitive
 from stages.core.artifact import write_text
+from stages.core.naming import identifier, unique
 
 WHITE = 255
 

@@ -1,12 +1,12 @@
 """The folder that `bake` wrote, opened for a reader: its manifest checked, its model read, its name made safe."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from stages.asset.read_glb import Look, TexturedModel, read_model
 from stages.core.artifact import Provenance, read_manifest, sha256_file
 from stages.core.errors import ArtifactError
+from stages.core.naming import identifier, unique
 from stages.core.schemas import ASSET
 
 MODEL = "model.glb"
@@ -47,22 +47,3 @@ def read_asset(folder: Path) -> Asset:
         raise ArtifactError(f"{folder / MODEL}: not the file that {ASSET.manifest} lists; bake the asset again")
     name = identifier(Path(str(provenance.extra.get("source_name", "asset"))).stem)
     return Asset(folder, name, provenance, read_model(folder / MODEL), sha256_file(folder / ASSET.manifest))
-
-
-def identifier(name: str) -> str:
-    """A name as every target takes it: letters, digits and underscores, the first one no digit."""
-    safe = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "asset"
-    return f"_{safe}" if safe[0].isdigit() else safe
-
-
-def unique(names: list[str]) -> list[str]:
-    """The same names, a number behind each that came before (whatever its case: some file systems know none)."""
-    taken: set[str] = set()
-    result = []
-    for name in names:
-        number, candidate = 2, name
-        while candidate.lower() in taken:
-            number, candidate = number + 1, f"{name}_{number}"
-        taken.add(candidate.lower())
-        result.append(candidate)
-    return result

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from stages.asset.model import Model, Part
 from stages.asset.passed_on import TEXTURES, PassedOn
+from stages.asset.worn import Worn
 from stages.core.artifact import written_atomically
 
 FLOAT, UINT16, UINT32 = 5126, 5123, 5125
@@ -32,26 +33,39 @@ def generator() -> str:
 
 
 @dataclass(frozen=True)
-class Look:
-    """What the materials show.
+class Pictures:
+    """PNG files of one texture set.
 
-    images: PNG files by name: "albedo" (sRGB), "orm" (linear: R occlusion, G roughness, B metallic) and, where there is
-    relief, "normal" (linear). occlusion: whether R of "orm" holds any, for materials
-    that bring none. passed_on: what else the source's materials had. wrap: how the images go on beyond their edges.
+    images: by map: "albedo" (sRGB), "orm" (linear: R occlusion, G roughness, B metallic) and, where there is relief, "normal"
+    (linear). suffix: behind the maps' names. wrap: how they go on beyond their edges.
     """
 
     images: dict[str, bytes]
-    occlusion: bool = False
-    passed_on: PassedOn = field(default_factory=PassedOn)
+    suffix: str = ""
     wrap: int = CLAMP
 
-    def material(self, name: str) -> dict[str, Any]:
-        """glTF's material; the textures baked here take the rows of `images`, those passed on the rows after them."""
-        row = {image: index for index, image in enumerate(self.images)}
+
+@dataclass(frozen=True)
+class Look:
+    """What the materials show.
+
+    sets: pictures of each texture set. occlusion: whether R of "orm" holds any, for materials that bring none. passed_on: what
+    else the source's materials had.
+    """
+
+    sets: list[Pictures]
+    occlusion: bool = False
+    passed_on: PassedOn = field(default_factory=PassedOn)
+
+    def material(self, worn: Worn) -> dict[str, Any]:
+        """glTF's material; the textures baked here come first, those passed on take the rows after them."""
+        before = sum(len(pictures.images) for pictures in self.sets[: worn.set])
+        baked = sum(len(pictures.images) for pictures in self.sets)
+        row = {image: before + index for index, image in enumerate(self.sets[worn.set].images)}
         pbr = {"baseColorTexture": {"index": row["albedo"]}, "metallicRoughnessTexture": {"index": row["orm"]}}
-        made: dict[str, Any] = {"name": name or "material", "pbrMetallicRoughness": pbr}
-        for key, value in self.passed_on.materials.get(name, {}).items():
-            made[key] = value | {"index": value["index"] + len(row)} if key in TEXTURES else value
+        made: dict[str, Any] = {"name": worn.name or "material", "pbrMetallicRoughness": pbr}
+        for key, value in self.passed_on.materials.get(worn.slot, {}).items():
+            made[key] = value | {"index": value["index"] + baked} if key in TEXTURES else value
         if "normal" in row:
             made["normalTexture"] = {"index": row["normal"]}
         if self.occlusion:
@@ -59,13 +73,15 @@ class Look:
         return made
 
     def textures(self) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-        """glTF's textures and samplers; the first sampler is the baked textures' own."""
+        """glTF's textures and samplers; the first samplers are the baked textures' own."""
+        wraps = list(dict.fromkeys(pictures.wrap for pictures in self.sets))
         samplers: list[dict[str, Any]] = [
-            {"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": self.wrap, "wrapT": self.wrap},
+            {"magFilter": LINEAR, "minFilter": TRILINEAR, "wrapS": wrap, "wrapT": wrap} for wrap in wraps
         ]
-        textures: list[dict[str, Any]] = [{"source": index, "sampler": 0} for index in range(len(self.images))]
+        own = [wraps.index(pictures.wrap) for pictures in self.sets for _ in pictures.images]
+        textures: list[dict[str, Any]] = [{"source": index, "sampler": sampler} for index, sampler in enumerate(own)]
         for texture in self.passed_on.textures:
-            entry = {"source": len(self.images) + texture["image"]}
+            entry = {"source": len(own) + texture["image"]}
             if "sampler" in texture:
                 if texture["sampler"] not in samplers:
                     samplers.append(texture["sampler"])
@@ -75,7 +91,8 @@ class Look:
 
     def stored_images(self, buffer: "_Buffer") -> list[dict[str, Any]]:
         """glTF's images, whose bytes go into the buffer."""
-        files = [(name, "image/png", data) for name, data in self.images.items()] + self.passed_on.images
+        baked = [(name + of.suffix, "image/png", data) for of in self.sets for name, data in of.images.items()]
+        files = baked + self.passed_on.images
         return [
             ({"name": name} if name else {}) | {"mimeType": kind, "bufferView": buffer.view(data)}
             for name, kind, data in files
@@ -85,8 +102,8 @@ class Look:
 def write_glb(path: Path, model: Model, look: Look) -> None:
     """Write model.glb atomically."""
     buffer = _Buffer()
-    names = list(dict.fromkeys(part.material for part in model.parts))
-    meshes, nodes, roots = _scene(model, names, buffer)
+    materials = list(dict.fromkeys(part.worn for part in model.parts))
+    meshes, nodes, roots = _scene(model, materials, buffer)
     sides = {"doubleSided": True} if model.double_sided else {}
     textures, samplers = look.textures()
     document: dict[str, Any] = {
@@ -95,7 +112,7 @@ def write_glb(path: Path, model: Model, look: Look) -> None:
         "scenes": [{"nodes": roots}],
         "nodes": nodes,
         "meshes": meshes,
-        "materials": [look.material(name) | sides for name in names],
+        "materials": [look.material(worn) | sides for worn in materials],
         "textures": textures,
         "samplers": samplers,
         "images": look.stored_images(buffer),
@@ -150,7 +167,7 @@ class _Buffer:
         return self._known[key][1]
 
 
-def _scene(model: Model, materials: list[str], buffer: _Buffer) -> tuple[list[dict], list[dict], list[int]]:
+def _scene(model: Model, materials: list[Worn], buffer: _Buffer) -> tuple[list[dict], list[dict], list[int]]:
     """Meshes, nodes and the indices of the root nodes: a node and a mesh for each run of parts on one node."""
     meshes: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = []
@@ -205,7 +222,7 @@ def _columns(matrix: NDArray[np.float64]) -> list[float]:
     return matrix.T.reshape(-1).tolist()
 
 
-def _primitive(part: Part, materials: list[str], buffer: _Buffer) -> dict[str, Any]:
+def _primitive(part: Part, materials: list[Worn], buffer: _Buffer) -> dict[str, Any]:
     attributes = {"POSITION": buffer.accessor(part.positions, "VEC3", ARRAY, bounds=True)}
     attributes["NORMAL"] = buffer.accessor(part.normals, "VEC3", ARRAY)
     if part.tangents is not None:
@@ -216,7 +233,7 @@ def _primitive(part: Part, materials: list[str], buffer: _Buffer) -> dict[str, A
     return {
         "attributes": attributes,
         "indices": buffer.accessor(indices, "SCALAR", ELEMENTS),
-        "material": materials.index(part.material),
+        "material": materials.index(part.worn),
     }
 
 

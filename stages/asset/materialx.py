@@ -7,9 +7,10 @@ Every slot has two materials over the same pictures: `<slot>` by `gltf_pbr`, whi
 from pathlib import Path
 from typing import Any
 
-from stages.asset.folder import Asset, identifier, unique
+from stages.asset.folder import Asset
 from stages.asset.pictures import copy_model, write_pictures
 from stages.asset.read_glb import Look
+from stages.core.naming import identifier, unique
 
 
 def write_materialx(asset: Asset, out: Path) -> list[str]:

@@ -21,6 +21,7 @@ from stages.asset.corners import (
     transform_of,
 )
 from stages.asset.vertices import VertexTable, split_vertices
+from stages.asset.worn import Worn, worn_materials
 from stages.core.artifact import Artifact
 from stages.core.frames import Y_UP_TO_WORLD
 
@@ -33,14 +34,14 @@ ANY_TANGENT = np.array([1, 0, 0, 1], np.float32)
 
 @dataclass(frozen=True)
 class Part:
-    """One material slot of one node.
+    """One material of one node.
 
     transform: (4, 4) local to source frame. positions, normals: (N, 3) float32, local. uv: (N, 2), v down. tangents:
     (N, 4), or None without a normal map. triangles: (T, 3) uint32. Parts that share a vertex table share its arrays.
     """
 
     name: str
-    material: str
+    worn: Worn
     node: str
     transform: NDArray[np.float64]
     positions: NDArray[np.float32]
@@ -76,8 +77,9 @@ def source_model(prep: Artifact, double_sided: bool, normal_mapped: Collection[s
     usable = ~np.isin(prep["loop_vertex"][triangles], unusable_vertices(prep["source_vertices"])).any(1)
     if not usable.all():
         notes["faces_with_vertices_not_finite_left_out"] = len(np.unique(face[~usable]))
-    triangles, part = triangles[usable], prep["face_part"][face[usable]]
-    parts: dict[int, Part] = {}
+    worn, of_face = worn_materials(prep)
+    triangles, part, row = triangles[usable], prep["face_part"][face[usable]], of_face[face[usable]]
+    parts: dict[tuple[int, int], Part] = {}
     for numbers, start, stop in vertex_runs(prep):
         loops = np.flatnonzero(np.isin(loop_parts(prep), numbers))
         kinds = [uv, normals] if tangents is None else [uv, normals, tangents]
@@ -86,18 +88,19 @@ def source_model(prep: Artifact, double_sided: bool, normal_mapped: Collection[s
         arrays = positions[table.source], table.values(normals, ANY_NORMAL), table.values(uv, spare)
         frames = None if tangents is None else table.values(tangents, ANY_TANGENT)
         for number in numbers:
-            indices = table.of_loop[triangles[part == number]].astype(np.uint32)
-            parts[number] = _part(infos[number], arrays, frames if number in bumpy else None, indices)
-    in_order = [parts[number] for number in sorted(parts) if len(parts[number].triangles)]
+            for shown in np.unique(row[part == number]).tolist():
+                indices = table.of_loop[triangles[(part == number) & (row == shown)]].astype(np.uint32)
+                parts[number, shown] = _part(infos[number], worn[shown], arrays, frames if number in bumpy else None, indices)
+    in_order = [parts[key] for key in sorted(parts)]
     return Model(in_order, upright(prep["to_world"]), double_sided or bool(flipped_loops(prep).any()), notes)
 
 
 def _part(
-    info: dict[str, Any], arrays: tuple[NDArray, NDArray, NDArray], tangents: NDArray | None, triangles: NDArray
+    info: dict[str, Any], worn: Worn, arrays: tuple[NDArray, NDArray, NDArray], tangents: NDArray | None, triangles: NDArray
 ) -> Part:
     name = str(info["name"] or "mesh")
     node = str(info["node"] or name)
-    return Part(name, str(info["material"] or ""), node, transform_of(info), *arrays, tangents, triangles)
+    return Part(name, worn, node, transform_of(info), *arrays, tangents, triangles)
 
 
 def vertex_runs(prep: Artifact) -> list[tuple[list[int], int, int]]:

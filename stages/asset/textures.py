@@ -18,6 +18,7 @@ from stages.core.artifact import write_exr
 from stages.core.color import srgb_decode
 from stages.core.images import write_png
 from stages.core.parallel import in_parallel
+from stages.core.texture_sets import ONE_SET, TextureSet
 
 PNG_LEVEL = 3
 """zlib's level: within 2 % of the bytes of level 6, in two thirds of the time."""
@@ -51,11 +52,11 @@ def normal_8bit(normal: NDArray[np.float32]) -> NDArray[np.uint8]:
     return byte
 
 
-def write_textures(folder: Path, maps: Maps, grey: bool) -> list[str]:
+def write_textures(folder: Path, maps: Maps, grey: bool, of: TextureSet = ONE_SET) -> list[str]:
     """Write the masters and PNGs of the maps there are, several at a time.
 
     Args:
-        grey: also roughness.png and metallic.png, which MTL asks for.
+        of: the set by which files are named. grey: also roughness.png and metallic.png, which MTL asks for.
     Returns:
         the files' names.
     """
@@ -63,13 +64,13 @@ def write_textures(folder: Path, maps: Maps, grey: bool) -> list[str]:
 
     def write(name: str) -> None:
         if name in pngs:
-            write_png(folder / name, pngs[name](), PNG_LEVEL)
+            write_png(folder / of.file(name), pngs[name](), PNG_LEVEL)
         else:
-            write_exr(folder / name, exrs[name]())
+            write_exr(folder / of.file(name), exrs[name]())
 
     names = [*pngs, *exrs]
     in_parallel(write, names)
-    return names
+    return [of.file(name) for name in names]
 
 
 def pictures(maps: Maps, grey: bool) -> dict[str, Callable[[], NDArray[np.uint8]]]:

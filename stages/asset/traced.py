@@ -12,6 +12,7 @@ from stages.asset.passed_on import PassedOn
 from stages.core.artifact import Artifact
 from stages.core.color import srgb_decode
 from stages.core.images import decode_image
+from stages.core.texture_sets import triangle_sets
 from stages.light.emission import Emission
 from stages.light.lookup import REPEAT, Texture
 from stages.light.normal_maps import NormalMap, NormalMaps
@@ -57,9 +58,9 @@ def emissive_texture(passed_on: PassedOn, material: dict[str, Any]) -> Texture:
     return replace(worn, image=srgb_decode(worn.image[..., :3]).astype(np.float32) * factor)
 
 
-def baked_bumps(prep: Artifact, normal: NDArray[np.float32]) -> NormalMaps:
-    """A baked normal map (H, W, 3) on the whole mesh."""
-    return replace(world_frames(prep), maps=[NormalMap(normal)])
+def baked_bumps(prep: Artifact, normals: list[NDArray[np.float32]]) -> NormalMaps:
+    """Baked normal maps on the whole mesh. Args: normals: (H, W, 3) of each texture set."""
+    return replace(world_frames(prep), maps=[NormalMap(normal) for normal in normals], of_triangle=triangle_sets(prep))
 
 
 def world_frames(prep: Artifact, parts: Collection[int] | None = None) -> NormalMaps:

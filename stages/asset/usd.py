@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.asset.folder import Asset, identifier, unique
+from stages.asset.folder import Asset
 from stages.asset.pictures import write_pictures
 from stages.asset.read_glb import Look, Node, Primitive
+from stages.core.naming import identifier, unique
 
 EPOCH = 400_000_000
 """Seconds since 1970 of every file in a package (September 1982: ZIP begins in 1980), so that equal assets are equal bytes."""

@@ -10,9 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.asset.corners import authored_normals, loop_normals
+from stages.asset.worn import Worn, worn_materials
 from stages.core.artifact import Artifact, write_text
+from stages.core.texture_sets import TextureSet, texture_sets
 
 TEXTURES = {"map_Kd": "albedo.png", "map_Pr": "roughness.png", "map_Pm": "metallic.png"}
+"""By their plain names, see `core.texture_sets`."""
 
 
 def write_obj(path: Path, prep: Artifact, relief: bool = False) -> None:
@@ -29,17 +32,18 @@ def write_obj(path: Path, prep: Artifact, relief: bool = False) -> None:
     lines += _rows("v", prep["source_vertices"]) + _rows("vt", uv) + _rows("vn", normals)
     lines += _faces(prep, _corners(prep["loop_vertex"], uv_row, normal_row))
     write_text(path, "\n".join(lines) + "\n")
-    write_text(path.with_suffix(".mtl"), mtl([part["material"] for part in prep.provenance.extra["parts"]], relief))
+    write_text(path.with_suffix(".mtl"), mtl(worn_materials(prep)[0], texture_sets(prep.provenance), relief))
 
 
 def _faces(prep: Artifact, corners: list[str]) -> list[str]:
     """The polygons in their order, and before each the object, group and material that change there."""
     parts, groups = prep.provenance.extra["parts"], prep.provenance.extra["groups"]
+    worn, of_face = worn_materials(prep)
     starts, lines = prep["loop_start"].tolist(), list[str]()
     state: dict[str, str] = {"o": "", "g": "", "usemtl": ""}
     for face, (part, group) in enumerate(zip(prep["face_part"].tolist(), prep["face_group"].tolist(), strict=True)):
         names = {"o": parts[part]["node"], "g": groups[group] if group >= 0 else ""}
-        names["usemtl"] = slot_name(parts[part]["material"])
+        names["usemtl"] = slot_name(worn[of_face[face]].name)
         changed = [keyword for keyword in state if names[keyword] != state[keyword]]
         lines += [f"{keyword} {names[keyword]}".rstrip() for keyword in changed]
         state = names
@@ -52,13 +56,16 @@ def slot_name(material: str) -> str:
     return material or "material"
 
 
-def mtl(materials: list[str], relief: bool) -> str:
-    """An MTL file: one material per slot, all with the same textures."""
-    body = ["Kd 1 1 1", "Ks 0.5 0.5 0.5", "Ni 1.5", "illum 2", "Pr 1", "Pm 1"]
-    body += [f"{key} {file}" for key, file in TEXTURES.items()]
-    body += ["norm normal.png"] * relief
-    names = dict.fromkeys(slot_name(material) for material in materials)
-    return "\n\n".join("\n".join([f"newmtl {name}", *body]) for name in names) + "\n"
+def mtl(materials: list[Worn], sets: list[TextureSet], relief: bool) -> str:
+    """An MTL file: the materials with the textures of their sets."""
+    shown = {slot_name(worn.name): sets[worn.set] for worn in materials}
+    textures = TEXTURES | ({"norm": "normal.png"} if relief else {})
+    plain = ["Kd 1 1 1", "Ks 0.5 0.5 0.5", "Ni 1.5", "illum 2", "Pr 1", "Pm 1"]
+    entries = [
+        [f"newmtl {name}", *plain, *(f"{key} {of.file(file)}" for key, file in textures.items())]
+        for name, of in shown.items()
+    ]
+    return "\n\n".join("\n".join(lines) for lines in entries) + "\n"
 
 
 def obj_uv(prep: Artifact) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -1,5 +1,7 @@
 """What a lead artist would check of a baked asset, in numbers, for report.html."""
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,9 +10,10 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from stages.asset.report_page import Check
-from stages.bake.raster import Surface
+from stages.bake.raster import Surface, joined
 from stages.core.artifact import Artifact
 from stages.core.color import log_correlation, srgb_decode
+from stages.core.texture_sets import TextureSet, triangle_sets
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.scene import Scene
@@ -37,25 +40,54 @@ FARTHEST = 16
 """Texels under which the space between charts is measured."""
 
 
+@dataclass(frozen=True)
+class Facts:
+    """What the maps of one texture set tell, before they are put away.
+
+    texels: on charts. undecided: of these, in metallic. dielectric, odd: those that are no metal, and of these whose albedo is
+    out of range. gap: see `narrowest`. rows, surface: (K, 5) and where on the surface, of some texels.
+    """
+
+    texels: int
+    undecided: int
+    dielectric: int
+    odd: int
+    gap: int | None
+    rows: NDArray[np.float32]
+    surface: Surface
+
+    @staticmethod
+    def of(maps: NDArray[np.float32], touched: Surface, island: NDArray[np.int32], part: float) -> "Facts":
+        """Args: maps: (H, W, 5). touched: (H, W) surface points. island: (F,). part: the set's share of the surface."""
+        on_chart = touched.triangle >= 0
+        rows, surface = maps[on_chart], touched.where(on_chart)
+        count = min(math.ceil(POINTS * part), len(rows))
+        picked = np.sort(np.random.default_rng(0).choice(len(rows), count, replace=False))
+        gap = narrowest(np.where(on_chart, island[touched.triangle] + 1, 0).astype(np.int32))
+        dielectric, odd = out_of_range(rows)
+        return Facts(len(rows), undecided(rows[:, 4]), dielectric, odd, gap, rows[picked], surface[picked])
+
+
 def checks(
-    mesh: Artifact, maps: NDArray[np.float32], touched: Surface, scene: Scene, lights: list[Environment], said: dict[str, Any]
+    mesh: Artifact, sets: list[TextureSet], facts: list[Facts], scene: Scene, lights: list[Environment], said: dict[str, Any]
 ) -> list[Check]:
     """All of them.
 
     Args:
-        maps: (H, W, 5). touched: the surface point of each texel. lights: those whose light might have been baked in. said:
-        what bake.json says: "coverage", "unseen".
+        sets, facts: one for each texture set. lights: those whose light might have been baked in. said: what bake.json says:
+        "coverage", "unseen".
     """
-    on_chart = touched.triangle >= 0
-    rows = maps[on_chart]
+    texels = sum(of.texels for of in facts)
+    rows = np.concatenate([of.rows for of in facts])
+    between = sum(of.undecided for of in facts) / texels
     return [
-        density(mesh, len(maps)),
+        density(mesh, np.array([of.size for of in sets])[triangle_sets(mesh)]),
         coverage(said["coverage"]),
-        gutter(touched, islands(mesh)),
+        gutter(min((of.gap for of in facts if of.gap is not None), default=None)),
         share("Unseen", said["unseen"], 0.25, "of the surface that no view saw; its material is that of the nearest seen"),
-        share("Metallic undecided", undecided(rows[:, 4]), 0.05, "of the texels lie between 0.15 and 0.85"),
-        out_of_range(rows),
-        baked_light(mesh, rows, touched.where(on_chart), scene, lights),
+        share("Metallic undecided", between, 0.05, "of the texels lie between 0.15 and 0.85"),
+        albedo_range(sum(of.dielectric for of in facts), sum(of.odd for of in facts)),
+        baked_light(rows, joined([of.surface for of in facts]), scene, lights),
     ]
 
 
@@ -79,8 +111,8 @@ def coverage(value: float) -> Check:
     return Check("Texture used", percent(value), "fact", "of the texels lie on a chart; the others are filled from the nearest")
 
 
-def density(mesh: Artifact, size: int) -> Check:
-    """Texels per unit of the source, by area: the median, and how much it varies."""
+def density(mesh: Artifact, size: NDArray[np.int64]) -> Check:
+    """Texels per unit of the source, by area: the median, and how much it varies. Args: size: (F,) of their textures."""
     scale = np.cbrt(abs(np.linalg.det(mesh["to_world"][:3, :3])))
     corners = mesh["vertices"][mesh["triangles"]].astype(np.float64) / scale
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -106,10 +138,8 @@ def islands(mesh: Artifact) -> NDArray[np.int32]:
     return connected_components(graph, directed=False)[1][a].astype(np.int32)
 
 
-def gutter(touched: Surface, island: NDArray[np.int32]) -> Check:
-    """The narrowest space between two UV islands."""
-    labels = np.where(touched.triangle >= 0, island[touched.triangle] + 1, 0).astype(np.int32)
-    found = narrowest(labels)
+def gutter(found: int | None) -> Check:
+    """The narrowest space between two UV islands. Args: found: by `narrowest`."""
     value = f"{found} texels" if found is not None else f"{FARTHEST} texels or more"
     state = "good" if found is None or found >= GUTTER else "look"
     return Check("Padding", value, state, f"between the nearest two UV islands; {GUTTER} or more keep mip levels from bleeding")
@@ -143,14 +173,11 @@ def _neighbours(values: NDArray[np.int32], best: np.ufunc) -> NDArray[np.int32]:
     return values
 
 
-def baked_light(
-    mesh: Artifact, rows: NDArray[np.float32], surface: Surface, scene: Scene, lights: list[Environment]
-) -> Check:
+def baked_light(rows: NDArray[np.float32], surface: Surface, scene: Scene, lights: list[Environment]) -> Check:
     """Correlation of log albedo and log irradiance over some texels: what a light that was baked in would show."""
-    picked = np.sort(np.random.default_rng(0).choice(len(rows), min(POINTS, len(rows)), replace=False))
-    points = loose_points(scene, surface[picked])
+    points = loose_points(scene, surface)
     irradiance = sum(transport.E.float() for transport in light_transport(scene, points, lights, RAYS, 0))
-    value = log_correlation(rows[picked, :3], irradiance.numpy())  # type: ignore[union-attr]
+    value = log_correlation(rows[:, :3], irradiance.numpy())  # type: ignore[union-attr]
     note = "correlation of albedo and light, where 0 is none; under 0.2 either way is usual"
     return Check("Baked light", f"{value:+.2f}", "good" if abs(value) <= 0.2 else "look", note)
 
@@ -165,17 +192,21 @@ def loose_points(scene: Scene, surface: Surface) -> GBuffer:
     return GBuffer(mask, depth, point, point + LIFT * ng, n, ng, n, surface.triangle, weights)
 
 
-def undecided(metallic: NDArray[np.float32]) -> float:
-    """Share between UNDECIDED."""
-    return float(((metallic > UNDECIDED[0]) & (metallic < UNDECIDED[1])).mean())
+def undecided(metallic: NDArray[np.float32]) -> int:
+    """How many lie between UNDECIDED."""
+    return int(((metallic > UNDECIDED[0]) & (metallic < UNDECIDED[1])).sum())
 
 
-def out_of_range(rows: NDArray[np.float32]) -> Check:
-    """Share of what is not metal whose albedo no real dielectric has. Args: rows (N, 5)."""
+def out_of_range(rows: NDArray[np.float32]) -> tuple[int, int]:
+    """How many are not metal, and of these have an albedo that no real dielectric has. Args: rows (N, 5)."""
     low, high = (float(srgb_decode(np.array(edge))) for edge in DIELECTRIC)
-    dielectric = rows[rows[:, 4] < 0.5, :3]
+    brightest = rows[rows[:, 4] < 0.5, :3].max(1)
+    return len(brightest), int(((brightest > high) | (brightest < low)).sum())
+
+
+def albedo_range(dielectric: int, odd: int) -> Check:
+    """Share of what is not metal that is odd. Args: of `out_of_range`."""
     note = "of what is not metal; real ones lie between sRGB 30 and 240"
-    if not len(dielectric):
+    if not dielectric:
         return Check("Albedo out of range", "all metal", "fact", note)
-    brightest = dielectric.max(1)
-    return share("Albedo out of range", float(((brightest > high) | (brightest < low)).mean()), 0.01, note)
+    return share("Albedo out of range", odd / dielectric, 0.01, note)

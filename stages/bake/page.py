@@ -6,17 +6,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from stages.asset.report_page import Page, PageView, Shot, write_page
 from stages.asset.report_view import PageLight
-from stages.bake.checks import checks
+from stages.bake.checks import Facts, checks
 from stages.bake.preview import Look, draw_view
-from stages.bake.raster import Surface
 from stages.bake.studio import BACKDROP, EXPOSURE, FOV_Y, GROUND, VIEWS, backdrop, camera
 from stages.core.artifact import Artifact
 from stages.core.color import srgb_encode
 from stages.core.progress import Progress
+from stages.core.texture_sets import TextureSet
 from stages.light.environment import Environment, directions_of_texels
 from stages.light.lights import BUILTIN, direction, disc, gradient, panel, preview_light
 from stages.light.prefilter import cosine_harmonics, mip_levels, split_lamp
@@ -65,33 +64,47 @@ def softbox() -> Environment:
 
 
 def report_page(
-    out: Path, mesh: Artifact, made: Artifact, scene: Scene, touched: Surface, maps: NDArray[np.float32],
+    out: Path, mesh: Artifact, made: Artifact, look: Look, facts: list[Facts],
     files: list[str], said: dict[str, Any], size: int, progress: Progress,
 ) -> str:  # fmt: skip
-    """Write report.html. Args: said: what bake.json says. size: pixels of a picture. Returns: the file's name."""
+    """Write report.html.
+
+    Args:
+        look: the mesh as it is shown. facts: of each texture set. said: what bake.json says. size: pixels of a picture.
+    Returns:
+        the file's name.
+    """
     progress("report", 0, 1)
     source = str(said["source_name"])
-    lights = suspects(tuple(made.provenance.extra["environments"]))
+    lights, sets = suspects(tuple(made.provenance.extra["environments"])), [TextureSet.from_json(of) for of in said["sets"]]
     page = Page(
         name=Path(source).stem,
         prompt=str(said["prompt"] or ""),
-        meta=f"{source}, {len(mesh['triangles']):,} triangles, {len(maps)} × {len(maps)} texels",
-        checks=checks(mesh, maps, touched, scene, lights, said),
-        shots=pictures(scene, mesh["uv"], maps, max(32, 4 * size // 5 // 2 * 2)),
-        facts=facts(mesh, made, said, len(maps)),
+        meta=f"{source}, {len(mesh['triangles']):,} triangles, {extent(sets)}",
+        checks=checks(mesh, sets, facts, look.scene, lights, said),
+        shots=pictures(look, max(32, 4 * size // 5 // 2 * 2)),
+        facts=how_made(mesh, made, said),
         licences=[*LICENCES, *([SD_LICENCE] if str(said["guidance"].get("name")) == "sd" else [])],
         light=page_light(),
-        view=first_view(scene),
+        view=first_view(look.scene),
     )
     write_page(out / "report.html", page, files)
     progress("report", 1, 1)
     return "report.html"
 
 
-def pictures(scene: Scene, uv: NDArray[np.float32], maps: NDArray[np.float32], size: int) -> list[Shot]:
+def extent(sets: list[TextureSet]) -> str:
+    """How large the textures are, in words."""
+    low, high = min(of.size for of in sets), max(of.size for of in sets)
+    if len(sets) == 1:
+        return f"{high} × {high} texels"
+    return f"{len(sets)} texture sets of {f'{low} to ' if low < high else ''}{high} texels along an edge"
+
+
+def pictures(look: Look, size: int) -> list[Shot]:
     """The asset from two sides under lights that nothing was trained on; the view in 3-D has a third one, preview.png's."""
-    shots, look = [], Look(scene, uv * (1, -1) + (0, 1), maps)
-    used = scene.vertices[np.unique(scene.triangles)].astype(np.float64)
+    shots = []
+    used = look.scene.vertices[np.unique(look.scene.triangles)].astype(np.float64)
     for light in (dusk(), softbox()):
         for azimuth, elevation in SHOT_VIEWS:
             picture = draw_view(look, light, camera(used, azimuth, elevation), size)
@@ -123,7 +136,7 @@ def first_view(scene: Scene) -> PageView:
     return PageView(azimuth, elevation, float(FOV_Y), float(max(distances)), (GROUND, BACKDROP))
 
 
-def facts(mesh: Artifact, made: Artifact, said: dict[str, Any], size: int) -> dict[str, str]:
+def how_made(mesh: Artifact, made: Artifact, said: dict[str, Any]) -> dict[str, str]:
     """How the asset was made, in words."""
     guidance = dict(said["guidance"])
     name = str(guidance.pop("name", ""))

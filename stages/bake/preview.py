@@ -6,18 +6,21 @@ project's own transport under an environment that distillation never saw (`stage
 without a tone curve: Blender's "Standard" view, three.js without tone mapping.
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
+from stages.core.artifact import Artifact
 from stages.core.color import srgb_encode
 from stages.core.frames import camera_rays
 from stages.core.images import labelled
 from stages.core.parallel import in_parallel
 from stages.core.progress import Progress
+from stages.core.texture_sets import triangle_sets
 from stages.core.tiles import repeats
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer, facing, surface_points
@@ -56,46 +59,56 @@ class Picture:
         return over(self.alpha, self.color, background)
 
 
-def contact_sheet(
-    scene: Scene, uv: NDArray[np.float32], maps: NDArray[np.float32], size: int, progress: Progress
-) -> NDArray[np.float32]:
+def contact_sheet(look: "Look", size: int, progress: Progress) -> NDArray[np.float32]:
     """Draw the preview.
 
     Args:
-        uv: (F, 3, 2) of the triangles' corners. maps: (H, W, 5) baked albedo, roughness, metallic. size: pixels along
-        each edge of one view.
+        size: pixels along each edge of one view.
     Returns:
         (rows, columns, 3) encoded sRGB in [0, 1].
     """
-    light = preview_light()
+    light, scene = preview_light(), look.scene
     progress("preview", 0, 1)
     cached_light_set((light,))  # once, not in every thread
-    look = Look(scene, uv * (1, -1) + (0, 1), maps)
     drawn = in_parallel(lambda c2w: draw_view(look, light, c2w, size), cameras(scene.vertices, scene.triangles))
     cells = [srgb_encode(picture.over(backdrop(size))) for picture in drawn]
-    cells += [*material_cells(drawn[0]), labelled(atlas(maps, size), "albedo.png")]
+    named = "albedo.png" if len(look.maps) == 1 else "albedo of each set"
+    cells += [*material_cells(drawn[0]), labelled(atlases(look.maps, size), named)]
     progress("preview", 1, 1)
     return np.concatenate([np.concatenate(cells[k : k + COLUMNS], 1) for k in range(0, len(cells), COLUMNS)], 0)
 
 
 @dataclass(frozen=True)
 class Look:
-    """A mesh and its textures. uv: (F, 3, 2), v down. maps: (H, W, 5)."""
+    """A mesh and its textures.
+
+    uv: (F, 3, 2), v down. maps: (H, W, 5) of each texture set. of_triangle: (F,) row of its maps.
+    """
 
     scene: Scene
-    uv: NDArray[np.float32]
-    maps: NDArray[np.float32]
+    uv: NDArray
+    maps: list[NDArray[np.float32]]
+    of_triangle: NDArray[np.int32]
+    wraps: list[int] = field(init=False)  # how the textures go on beyond their edges, as in model.glb
 
-    @property
-    def wrap(self) -> int:
-        """How the textures go on beyond their edges, as in model.glb."""
-        return REPEAT if repeats(self.uv) else CLAMP
+    def __post_init__(self) -> None:
+        mine = [self.uv[self.of_triangle == number] for number in range(len(self.maps))]
+        object.__setattr__(self, "wraps", [REPEAT if repeats(uv) else CLAMP for uv in mine])
+
+    @staticmethod
+    def of(mesh: Artifact, scene: Scene, maps: list[NDArray[np.float32]]) -> "Look":
+        """Of a prep.npz."""
+        return Look(scene, mesh["uv"] * (1, -1) + (0, 1), maps, triangle_sets(mesh))
 
     def material(self, points: GBuffer, across: NDArray) -> NDArray[np.float32]:
         """Albedo, roughness and metallic (P, 5), the mean over a patch around each point. Args: across: of `footprint`."""
-        uv = self.uv[points.triangle]
+        uv, row = self.uv[points.triangle], self.of_triangle[points.triangle]
         middle, edges = np.einsum("pk,pkd->pd", points.barycentric, uv), np.einsum("pek,pkd->ped", across, uv)
-        return look_up(self.maps, middle, edges, (self.wrap, self.wrap))[:, :5]
+        result = np.empty((len(row), 5), np.float32)
+        for number in np.unique(row).tolist():
+            mine, wrap = np.flatnonzero(row == number), self.wraps[number]
+            result[mine] = look_up(self.maps[number], middle[mine], edges[mine], (wrap, wrap))[:, :5]
+        return result
 
     def points(
         self, hits: Hits, directions: NDArray, mask: NDArray[np.bool_], c2w: NDArray, step: float
@@ -200,6 +213,18 @@ def material_cells(picture: Picture) -> list[NDArray[np.float32]]:
         shown = srgb_encode(values) if name == "albedo" else np.repeat(values, 3, 2)
         cells.append(labelled(over(picture.alpha, shown, np.array(MAP_BACKDROP, np.float32)), name))
     return cells
+
+
+def atlases(maps: list[NDArray[np.float32]], size: int) -> NDArray[np.float32]:
+    """The albedo textures beside each other in one cell, encoded. Returns: (size, size, 3)."""
+    across = math.ceil(math.sqrt(len(maps)))
+    edge = size // across
+    sheet = np.empty((size, size, 3), np.float32)
+    sheet[:] = MAP_BACKDROP
+    for number, one in enumerate(maps if edge else []):
+        row, column = edge * (number // across), edge * (number % across)
+        sheet[row : row + edge, column : column + edge] = atlas(one, edge)
+    return sheet
 
 
 def atlas(maps: NDArray[np.float32], size: int) -> NDArray[np.float32]:

@@ -45,12 +45,18 @@ class Surface:
         return result
 
 
+def joined(parts: list[Surface]) -> Surface:
+    """Points (N,) of several, one after the other."""
+    triangle = np.concatenate([part.triangle for part in parts])
+    return Surface(triangle, np.concatenate([part.barycentric for part in parts]))
+
+
 @dataclass(frozen=True)
 class Layout:
     """Triangles in texel space.
 
-    uv: (F, 3, 2) corners of each, wherever they lie. corners: (D, 3, 2) the copies on the texture, in the order in which they
-    are drawn, face (D,) of each, top and bottom (D,). size: of the texture, texels.
+    uv: (F, 3, 2) corners of each, wherever they lie, 0 of those that are on other textures. corners: (D, 3, 2) the copies on
+    the texture, in the order in which they are drawn, face (D,) of each, top and bottom (D,). size: of the texture, texels.
     """
 
     uv: NDArray[np.float64]
@@ -61,13 +67,23 @@ class Layout:
     size: int
 
     @staticmethod
-    def of(uv: NDArray[np.float32], size: int, charts: NDArray[np.int32] | None = None) -> "Layout":
-        """From UVs (F, 3, 2), v up, and charts (F,) in the order in which they represent what they share; None for any."""
-        copies = drawn(uv, np.zeros(len(uv), np.int32) if charts is None else charts)
+    def of(
+        uv: NDArray[np.float32], size: int, charts: NDArray[np.int32] | None = None, mine: NDArray[np.bool_] | None = None
+    ) -> "Layout":
+        """From UVs (F, 3, 2), v up.
+
+        Args:
+            charts: (F,) in the order in which they represent what they share; any where None. mine: (F,) which lie on this
+            texture; all where None.
+        """
+        rows = np.flatnonzero(np.ones(len(uv), bool) if mine is None else mine).astype(np.int32)
+        copies = drawn(uv[rows], np.zeros(len(rows), np.int32) if charts is None else charts[rows])
+        own = np.zeros_like(uv)
+        own[rows] = uv[rows]
         corners = in_texels(copies.corners, size)
         a, b, c = corners[:, 0, 1], corners[:, 1, 1], corners[:, 2, 1]
         top, bottom = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-        return Layout(in_texels(uv, size), corners, copies.face, top, bottom, size)
+        return Layout(in_texels(own, size), corners, rows[copies.face], top, bottom, size)
 
     def in_rows(self, rows: range) -> NDArray[np.int64]:
         """Indices, ascending, of the copies whose bounding box meets some rows."""

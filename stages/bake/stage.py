@@ -1,6 +1,7 @@
 """The bake stage: prep.npz and material.npz in, a folder with textures, models and a preview out."""
 
 import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -9,18 +10,20 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from stages.asset.gltf import Look, write_glb
+from stages.asset import gltf
+from stages.asset.gltf import write_glb
 from stages.asset.maps import Maps
 from stages.asset.model import source_model
 from stages.asset.passed_on import PassedOn
 from stages.asset.textures import write_textures
 from stages.asset.traced import baked_bumps, traced_scene, world_frames
 from stages.asset.wavefront import write_obj
+from stages.bake.checks import Facts, islands
 from stages.bake.fill import fill_unseen, pad
 from stages.bake.occlusion import occlusion_map
 from stages.bake.options import BakeOptions
 from stages.bake.page import report_page
-from stages.bake.preview import contact_sheet
+from stages.bake.preview import Look, contact_sheet
 from stages.bake.raster import Layout, Surface, touched_texels
 from stages.bake.relief import relief_normals
 from stages.bake.studio import write_studio
@@ -44,8 +47,8 @@ from stages.core.errors import ArtifactError, OutputError
 from stages.core.images import write_png
 from stages.core.progress import Progress, silent
 from stages.core.schemas import ASSET, MATERIAL, PREP
-from stages.core.tiles import repeats, signed_area
-from stages.light.lookup import CLAMP, REPEAT
+from stages.core.texture_sets import ONE_SET, TextureSet, texture_sets, triangle_sets
+from stages.core.tiles import signed_area
 from stages.light.scene import Scene
 from stages.material.learnt import LearntMaterial
 from stages.material.relief import bounded
@@ -66,7 +69,8 @@ class BakeResult:
 class Subject:
     """The mesh, ready to trace and to bake.
 
-    open: whether the backs of its triangles can be seen. touched: (size, size) the surface point of each texel.
+    open: whether the backs of its triangles can be seen. set: the texture set that is baked, layout: what lies on its texture,
+    touched: (size, size) the surface point of each of its texels.
     """
 
     mesh: Artifact
@@ -74,21 +78,34 @@ class Subject:
     open: bool
     layout: Layout
     touched: Surface
+    set: TextureSet = ONE_SET
 
     @staticmethod
     def of(prep: Path, mesh: Artifact, size: int) -> "Subject":
-        """From prep.npz. Raises: ArtifactError when no texel of the texture would show any surface."""
-        layout = Layout.of(mesh["uv"], size, mesh["charts"])
-        touched = touched_texels(layout)
-        if not signed_area(mesh["uv"]).any() or not (touched.triangle >= 0).any():
-            raise ArtifactError(f"{prep}: its UVs cover no texel of {size}; make it again with new UVs")
-        scene = traced_scene(mesh)
-        return Subject(mesh, scene, is_open(mesh["triangles"]), layout, touched)
+        """From prep.npz, with its first texture set. Raises: ArtifactError."""
+        return next(subjects(prep, mesh, [replace(texture_sets(mesh.provenance)[0], size=size)]))
 
     def points(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """World positions and interpolated normals of surface points, (N, 3) each."""
         corners = self.mesh["vertices"][self.mesh["triangles"]]
         return surface.interpolate(corners), surface.interpolate(self.mesh["normals"])
+
+
+def subjects(prep: Path, mesh: Artifact, sets: list[TextureSet]) -> Iterator[Subject]:
+    """The mesh with one texture set after the other.
+
+    Args:
+        prep: what the mesh is from. sets: the mesh's first ones, with sizes.
+    Raises: ArtifactError when no texel of a texture would show any surface.
+    """
+    scene, open_mesh, of_triangle = traced_scene(mesh), is_open(mesh["triangles"]), triangle_sets(mesh)
+    for number, chosen in enumerate(sets):
+        layout = Layout.of(mesh["uv"], chosen.size, mesh["charts"], of_triangle == number)
+        touched = touched_texels(layout)
+        if not signed_area(layout.uv).any() or not (touched.triangle >= 0).any():
+            named = f" of set {chosen.name}" if chosen.name else ""
+            raise ArtifactError(f"{prep}: its UVs cover no texel of {chosen.size}{named}; make it again with new UVs")
+        yield Subject(mesh, scene, open_mesh, layout, touched, chosen)
 
 
 def bake(
@@ -117,17 +134,19 @@ def bake(
         return BakeResult(out, True, sorted(read_manifest(out, ASSET)[1]), known.extra)
     learnt = LearntMaterial.of(material, made, options.library)
     with run_log(out) as measured:
-        subject = Subject.of(prep, mesh, options.size)
+        sets = [replace(chosen, size=options.size) for chosen in texture_sets(mesh.provenance)]
         open_folder(out)
-        maps, coverage = bake_maps(subject, made, learnt, options, progress)
-        maps = with_normals(subject, maps)
-        subject = replace(subject, scene=shown_scene(subject, maps))
-        files, notes = write_asset(out, subject, maps, options, progress)
-        report = {**describe(mesh, made), **coverage, **notes}
-        where = (subject.scene, subject.touched)
-        files.append(report_page(out, mesh, made, *where, maps.material, files, report, options.preview_size, progress))
+        shown, covered = list[Shown](), list[Covered]()
+        for subject in subjects(prep, mesh, sets):
+            maps, on_charts = bake_maps(subject, made, learnt, options, progress)
+            shown.append(write_set(out, subject, with_normals(subject, maps), progress))
+            covered.append(on_charts)
+        files, look, notes = write_asset(out, subject, shown, options.preview_size, progress)
+        report = {**describe(mesh, made), **shares(covered), **notes, "sets": [of.to_json() for of in sets]}
+        facts = [of.facts for of in shown]
+        files.append(report_page(out, mesh, made, look, facts, files, report, options.preview_size, progress))
         write_manifest(out, ASSET, Provenance(wanted.options, wanted.seed, inputs, report), files)
-        measured["texture_size"] = options.size
+        measured["texture_size"] = max(of.size for of in sets)
     return BakeResult(out, False, sorted(files), report)
 
 
@@ -150,14 +169,26 @@ def open_folder(out: Path) -> None:
         raise OutputError(f"{out}: cannot be written: {reason(error)}; give a folder that can") from error
 
 
+@dataclass(frozen=True)
+class Covered:
+    """Texels of a texture, those on its charts, and of these those that no view saw."""
+
+    texels: int
+    on_charts: int
+    unseen: int
+
+
+def shares(covered: list[Covered]) -> dict[str, float]:
+    """The shares of texels on charts and, of these, that no view saw, over all sets."""
+    on_charts = sum(of.on_charts for of in covered)
+    texels, unseen = sum(of.texels for of in covered), sum(of.unseen for of in covered)
+    return {"coverage": round(on_charts / texels, 6), "unseen": round(unseen / on_charts, 6)}
+
+
 def bake_maps(
     subject: Subject, made: Artifact, learnt: LearntMaterial, options: BakeOptions, progress: Progress
-) -> tuple[Maps, dict[str, Any]]:
-    """The material of every texel, to the last one.
-
-    Returns:
-        the maps; the shares of texels on charts and, of these, that no view saw.
-    """
+) -> tuple[Maps, Covered]:
+    """The material of every texel of a set, to the last one."""
     on_chart = subject.touched.triangle >= 0
     mesh = subject.mesh
     texels = Texels(learnt, mesh["vertices"][mesh["triangles"]], mesh["normals"], subject.layout, subject.touched)
@@ -172,8 +203,8 @@ def bake_maps(
     progress("padding", 0, 1)
     pad(on_chart, maps, occlusion)
     height = bounded(maps[..., 5], options.relief) if learnt.recipe.has_relief and options.relief else None
-    shares = {"coverage": round(float(on_chart.mean()), 6), "unseen": round(unseen, 6)}
-    return Maps(np.ascontiguousarray(maps[..., :5]), height, occlusion=occlusion), shares
+    covered = Covered(on_chart.size, int(on_chart.sum()), unseen)
+    return Maps(np.ascontiguousarray(maps[..., :5]), height, occlusion=occlusion), covered
 
 
 def with_normals(subject: Subject, maps: Maps) -> Maps:
@@ -189,20 +220,46 @@ def with_normals(subject: Subject, maps: Maps) -> Maps:
     return replace(maps, normal=normals)
 
 
-def shown_scene(subject: Subject, maps: Maps) -> Scene:
-    """The scene with the normals that the asset's own normal map gives."""
-    return subject.scene if maps.normal is None else subject.scene.bumped(baked_bumps(subject.mesh, maps.normal))
+@dataclass(frozen=True)
+class Shown:
+    """What remains of a texture set when its maps are written.
+
+    files: their names. material: (H, W, 5), normal: (H, W, 3) or None, as pictures show them. occlusion: whether there is any.
+    facts: for the report.
+    """
+
+    set: TextureSet
+    files: list[str]
+    material: NDArray[np.float32]
+    normal: NDArray[np.float32] | None
+    occlusion: bool
+    facts: Facts
+
+
+def write_set(out: Path, subject: Subject, maps: Maps, progress: Progress) -> Shown:
+    """Write the maps of a texture set."""
+    progress("files", 0, 1)
+    files = write_textures(out, maps, subject.mesh.provenance.extra["source_format"] == "obj", subject.set)
+    facts = Facts.of(maps.material, subject.touched, islands(subject.mesh), subject.set.share)
+    return Shown(subject.set, files, maps.material, maps.normal, maps.occlusion is not None, facts)
+
+
+def shown_look(subject: Subject, shown: list[Shown]) -> Look:
+    """The mesh with the materials and the normals that the asset's own maps give it."""
+    normals = [of.normal for of in shown if of.normal is not None]
+    scene = subject.scene.bumped(baked_bumps(subject.mesh, normals)) if normals else subject.scene
+    return Look.of(subject.mesh, scene, [of.material for of in shown])
 
 
 def mend_unseen(
     subject: Subject, groups: Patches, views: Views, residual: NDArray[np.float32], progress: Progress
-) -> float:
+) -> int:
     """Fill, in place, what was learnt at texels that no view saw from seen surface nearby; all stay when none was seen.
 
     Args:
         groups: the texels, by which sight is decided. residual: (H, W, 5).
     Returns:
-        the share of texels on charts that no view saw.
+        how many texels on charts no view saw.
     """
     progress("visibility", 0, 1)
     on_chart = subject.touched.triangle >= 0
@@ -218,7 +275,7 @@ def mend_unseen(
         known, wanted = subject.points(first[seen]), subject.points(surface[~texel_seen])
         values[~texel_seen] = fill_unseen(known, groups.mean(values)[seen], wanted)
         residual[on_chart] = values
-    return float((~texel_seen).mean())
+    return int((~texel_seen).sum())
 
 
 def views_of(made: Artifact) -> Views:
@@ -228,37 +285,34 @@ def views_of(made: Artifact) -> Views:
 
 
 def write_asset(
-    out: Path, subject: Subject, maps: Maps, options: BakeOptions, progress: Progress
-) -> tuple[list[str], dict[str, int]]:
-    """Write textures, models and preview. Returns: the files' names; what the models could not hold."""
-    progress("files", 0, 1)
-    mesh, scene = subject.mesh, subject.scene
-    is_obj = mesh.provenance.extra["source_format"] == "obj"
-    files = write_textures(out, maps, grey=is_obj)
-    names = {part["material"] for part in mesh.provenance.extra["parts"]}
-    look = look_of(out, maps, PassedOn.of(mesh), REPEAT if repeats(mesh["uv"]) else CLAMP)
-    normal_mapped = set(look.passed_on.normal_maps()) if maps.normal is None else names
-    model = source_model(mesh, subject.open, normal_mapped)
-    write_glb(out / "model.glb", model, look)
-    files.append("model.glb")
-    if is_obj:
-        write_obj(out / "model.obj", mesh, relief=maps.normal is not None)
-        files += ["model.obj", "model.mtl"]
-    write_png(out / "preview.png", contact_sheet(scene, mesh["uv"], maps.material, options.preview_size, progress))
-    files += ["preview.png", *write_studio(out, mesh, options.preview_size)]
-    return files, model.notes
+    out: Path, subject: Subject, shown: list[Shown], preview_size: int, progress: Progress
+) -> tuple[list[str], Look, dict[str, int]]:
+    """Write models and preview of texture sets that are written.
 
-
-def look_of(folder: Path, maps: Maps, passed_on: PassedOn, wrap: int = CLAMP) -> Look:
-    """What model.glb's materials show: the PNGs in the folder, and what the source brings that they do not replace.
-
-    Args:
-        wrap: how the textures go on beyond their edges, glTF's number.
+    Returns:
+        the files' names, textures too; what the preview shows; what the models could not hold.
     """
-    names = ["albedo", "orm"] + ["normal"] * (maps.normal is not None)
-    passed_on = passed_on if maps.normal is None else passed_on.without("normalTexture")
-    images = {name: (folder / f"{name}.png").read_bytes() for name in names}
-    return Look(images, maps.occlusion is not None, passed_on, wrap)
+    mesh, relief = subject.mesh, shown[0].normal is not None
+    files = [name for of in shown for name in of.files]
+    look, passed_on = shown_look(subject, shown), PassedOn.of(mesh)
+    passed_on = passed_on.without("normalTexture") if relief else passed_on
+    names = {part["material"] for part in mesh.provenance.extra["parts"]}
+    model = source_model(mesh, subject.open, names if relief else set(passed_on.normal_maps()))
+    pictures = [pictures_of(out, of, wrap) for of, wrap in zip(shown, look.wraps, strict=True)]
+    write_glb(out / "model.glb", model, gltf.Look(pictures, shown[0].occlusion, passed_on))
+    files.append("model.glb")
+    if mesh.provenance.extra["source_format"] == "obj":
+        write_obj(out / "model.obj", mesh, relief)
+        files += ["model.obj", "model.mtl"]
+    write_png(out / "preview.png", contact_sheet(look, preview_size, progress))
+    return [*files, "preview.png", *write_studio(out, mesh, preview_size)], look, model.notes
+
+
+def pictures_of(folder: Path, shown: Shown, wrap: int) -> gltf.Pictures:
+    """The PNGs in the folder that model.glb takes. Args: wrap: how they go on beyond their edges, glTF's number."""
+    names = ["albedo", "orm"] + ["normal"] * (shown.normal is not None)
+    images = {name: (folder / shown.set.file(f"{name}.png")).read_bytes() for name in names}
+    return gltf.Pictures(images, shown.set.suffix, wrap)
 
 
 def describe(mesh: Artifact, made: Artifact) -> dict[str, Any]:

@@ -37,8 +37,10 @@ class Texels:
         self._made, self._corners, self._normals = made, corners, normals
         self._layout, self._touched = layout, touched
         self._texel = texel_size(corners, layout)
-        centre, mean = corners.mean(1), normals.mean(1)
-        self._piece = made.lookup.surface(centre, mean, self._texel).piece  # (F,)
+        shown = np.unique(layout.face)
+        centre, mean = corners[shown].mean(1), normals[shown].mean(1)
+        self._piece = np.zeros(len(corners), np.int32)  # (F,), of those that the layout shows
+        self._piece[shown] = made.lookup.surface(centre, mean, self._texel[shown]).piece
 
     def residual(self) -> NDArray[np.float32]:
         """What was learnt at every texel that a chart touches: (size, size, 5) logits, 0 off the charts."""

@@ -7,7 +7,7 @@ from stages.core.artifact import Field, Schema
 
 PREP = Schema(
     "dreammat.prep",
-    3,
+    4,
     {
         # the working mesh: normalised world frame, welded, outward, triangles
         "vertices": Field("f4", ("V", 3)),
@@ -30,13 +30,15 @@ PREP = Schema(
         "loop_source_tangent": Field("i4", ("L",), rows_of="SG", least=-1),  # row of source_tangents, or -1
         "face_part": Field("i4", ("P",)),  # entry of extra["parts"]
         "face_group": Field("i4", ("P",)),  # entry of extra["groups"], or -1
+        "face_set": Field("i4", ("P",)),  # entry of extra["sets"], the texture set that the face shows
         "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, v up
     },
     # source_format: "obj" | "ply" | "stl" | "off" | "glb" | "fbx" | "usd"; uv_kept: bool; findings: what was found and mended;
     # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row)}
     # shared_texels: whether a texel may show more than one place, see `core.tiles`
+    # sets: texture sets, at least one, as `core.texture_sets` has them
     # groups: names of an OBJ's groups; passed_on: what materials of a glTF had besides, see `stages.asset.passed_on`
-    extra=("source_format", "source_name", "uv_kept", "shared_texels", "parts", "groups", "passed_on", "findings"),
+    extra=("source_format", "source_name", "uv_kept", "shared_texels", "parts", "sets", "groups", "passed_on", "findings"),
 )
 
 CAMERAS = Schema(
@@ -98,11 +100,12 @@ MATERIAL = Schema(
     extra=("recipe", "residual", "prompt", "guidance", "environments"),
 )
 
-ASSET = Schema("dreammat.asset", 2, manifest="bake.json")
+ASSET = Schema("dreammat.asset", 3, extra=("sets",), manifest="bake.json")
 """A folder: albedo, roughness, metallic and occlusion .exr; albedo.png, orm.png; model.glb; preview.png;
 report.html; bake.json.
 
-Where the material has them: normal .exr and .png, height.exr.
+Where the material has them: normal .exr and .png, height.exr. Where there are several texture sets, each has these maps under
+names of its own: bake.json's "sets", see `core.texture_sets`.
 """
 
 EXPORT = Schema("dreammat.export", 1, manifest="export.json")

@@ -12,6 +12,7 @@ from stages.core.artifact import Provenance, peek, plain_options, run_log, save_
 from stages.core.errors import InputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
+from stages.core.texture_sets import TextureSet
 from stages.core.tiles import flat
 from stages.prep.gltf_file import companions
 from stages.prep.layout import Kept, keep, sound, unusable, with_neighbours
@@ -87,6 +88,7 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
             "uv_kept": kept,
             "shared_texels": found.shared,
             "parts": [asdict(part) for part in source.parts],
+            "sets": [TextureSet(slots=tuple(dict.fromkeys(part.material for part in source.parts))).to_json()],
             "groups": source.groups,
             "passed_on": source.passed_on if kept else nothing_passed_on(),
             "findings": findings,
@@ -232,6 +234,7 @@ def _extras(source: Source, kept: bool) -> dict[str, NDArray]:
     none = np.full(len(source.loop_vertex), -1, np.int32)
     return {
         "face_group": none[: len(source.face_part)] if source.face_group is None else source.face_group,
+        "face_set": np.zeros(len(source.face_part), np.int32),
         "source_tangents": source.tangents,
         "loop_source_tangent": none if source.loop_tangent is None else source.loop_tangent,
         "source_images": np.frombuffer(b"".join(source.images if kept else []), np.uint8),

@@ -10,6 +10,7 @@ from stages.asset.gltf import write_chunks
 from stages.core.artifact import Provenance, write_manifest
 from stages.core.images import write_png
 from stages.core.schemas import ASSET
+from stages.core.texture_sets import TextureSet
 
 SIZE = 16
 
@@ -117,7 +118,8 @@ def save_asset(
     }  # fmt: skip
     write_chunks(folder / "model.glb", root, [bytes(parts.chunk)])
     files = [path.name for path in folder.iterdir()]
-    write_manifest(folder, ASSET, Provenance({}, 5, {"prep": "0" * 64}, {"source_name": source, "prompt": "a thing"}), files)
+    said = {"source_name": source, "prompt": "a thing", "sets": [TextureSet().to_json()]}
+    write_manifest(folder, ASSET, Provenance({}, 5, {"prep": "0" * 64}, said), files)
     return folder
 
 

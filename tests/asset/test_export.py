@@ -10,12 +10,13 @@ import pytest
 
 from stages.asset import export as export_module
 from stages.asset.export import export
-from stages.asset.folder import identifier, read_asset, unique
+from stages.asset.folder import read_asset
 from stages.asset.options import TARGETS, ExportOptions
 from stages.asset.read_glb import resized
 from stages.core.artifact import read_manifest, sha256_file, write_manifest
 from stages.core.errors import ArtifactError, InputError, OutputError
 from stages.core.images import read_image
+from stages.core.naming import identifier, unique
 from stages.core.schemas import ASSET, EXPORT
 from tests.asset.examples import MAPS, TURNED, dome, save_asset
 from tests.asset.glb import Glb

@@ -12,7 +12,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from stages.asset.corners import loop_normals
-from stages.asset.gltf import Look, shears, write_glb
+from stages.asset.gltf import Look, Pictures, shears, write_glb
 from stages.asset.model import Model, source_model
 from stages.asset.vertices import split_vertices
 from stages.asset.wavefront import write_obj
@@ -55,7 +55,7 @@ def write(folder: Path, model: Model) -> Path:
     for name in ("albedo", "orm"):
         write_png(folder / f"{name}.png", np.full((4, 4, 3), 128, np.uint8))
         pictures[name] = (folder / f"{name}.png").read_bytes()
-    write_glb(folder / "model.glb", model, Look(pictures))
+    write_glb(folder / "model.glb", model, Look([Pictures(pictures)]))
     return folder / "model.glb"
 
 

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from stages.asset.gltf import Look, write_glb
+from stages.asset.gltf import Look, Pictures, write_glb
 from stages.asset.model import source_model
 from stages.asset.passed_on import PassedOn
 from stages.asset.traced import traced_scene, uv_matrix
+from stages.asset.worn import Worn
 from stages.core.artifact import Artifact, load_npz
 from stages.core.frames import Y_UP_TO_WORLD, look_at
 from stages.core.images import write_png
@@ -81,7 +82,7 @@ def written(mesh: Artifact, folder: Path, kind: str = "") -> Glb:
     passed_on = PassedOn.of(mesh).without(kind)
     model = source_model(mesh, True, passed_on.normal_maps())
     baked = png(folder, (128, 128, 128))
-    write_glb(folder / "model.glb", model, Look({"albedo": baked, "orm": baked}, passed_on=passed_on))
+    write_glb(folder / "model.glb", model, Look([Pictures({"albedo": baked, "orm": baked})], passed_on=passed_on))
     issues = khronos_issues(folder / "model.glb")
     assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"]
     return Glb.read(folder / "model.glb")
@@ -239,7 +240,7 @@ def test_texture_transform_turns_as_three_js_does() -> None:
 
 def test_a_sources_own_occlusion_goes_before_the_baked_one(tmp_path: Path) -> None:
     built, source, _ = everything(tmp_path)
-    look = Look({"albedo": b"", "orm": b""}, occlusion=True, passed_on=PassedOn.of(prepared(built, tmp_path)))
-    own = look.material("skin")["occlusionTexture"]
+    look = Look([Pictures({"albedo": b"", "orm": b""})], occlusion=True, passed_on=PassedOn.of(prepared(built, tmp_path)))
+    own = look.material(Worn("skin", "skin", 0))["occlusionTexture"]
     assert (own["index"] > 1, own["strength"]) == (True, source["occlusionTexture"]["strength"])
-    assert look.material("other")["occlusionTexture"] == {"index": 1}
+    assert look.material(Worn("other", "other", 0))["occlusionTexture"] == {"index": 1}

@@ -12,6 +12,7 @@ from stages.core.artifact import Provenance, save_npz, sha256_file
 from stages.core.frames import Y_UP_TO_WORLD, look_at, transform_points
 from stages.core.polygons import triangulate
 from stages.core.schemas import MATERIAL, PREP
+from stages.core.texture_sets import TextureSet
 from stages.material.recipe import EVEN, Recipe
 from stages.material.residual import Residual, ResidualConfig
 from stages.material.survey import EMPTY, Survey
@@ -37,6 +38,8 @@ class Example:
     loop_normal: NDArray | None = None
     group: list[int] | None = None
     groups: tuple[str, ...] = ()
+    set: list[int] | None = None
+    sets: tuple[TextureSet, ...] = (TextureSet(),)
 
     def with_(self, **changes: Any) -> "Example":
         return replace(self, **changes)
@@ -105,6 +108,7 @@ def prep_arrays(example: Example) -> dict[str, NDArray]:
         "loop_source_normal": loops if has_normal else np.full(len(loops), -1, "i4"),
         "face_part": np.array(example.part, "i4"),
         "face_group": np.array(example.group or [-1] * len(example.faces), "i4"),
+        "face_set": np.array(example.set or [0] * len(example.faces), "i4"),
         "loop_uv": uv,
         "source_tangents": np.zeros((0, 4), "f4"),
         "loop_source_tangent": np.full(len(loops), -1, "i4"),
@@ -120,6 +124,7 @@ def save_prep(path: Path, example: Example) -> Path:
         "uv_kept": example.uv_kept,
         "shared_texels": example.shared_texels,
         "parts": example.parts,
+        "sets": [of.to_json() for of in example.sets],
         "groups": list(example.groups),
         "passed_on": nothing_passed_on(),
         "findings": {"vertices": len(example.vertices)},

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, uniform_filter
 from scipy.stats import norm
 
@@ -60,12 +61,17 @@ def test_a_footprint_is_what_the_next_ray_hits() -> None:
     assert np.abs(moved[here, 0] - step).max() < 0.03 * np.linalg.norm(step, axis=1).mean()
 
 
+def worn(scene: Scene, uv: NDArray, maps: NDArray) -> Look:
+    """A mesh with one texture set."""
+    return Look(scene, uv, [maps], np.zeros(len(uv), "i4"))
+
+
 def test_detail_of_one_texel_does_not_flicker() -> None:
     """A checkerboard of single texels in a small picture is even grey."""
     scene = sheet()
     maps = np.zeros((512, 512, 5), "f4")
     maps[..., :3] = (np.indices((512, 512)).sum(0) % 2)[..., None]
-    picture = draw_view(Look(scene, sheet_uv(scene), maps), preview_light(), camera(scene.vertices.astype(float), 20, 60), 24)
+    picture = draw_view(worn(scene, sheet_uv(scene), maps), preview_light(), camera(scene.vertices.astype(float), 20, 60), 24)
     inside = picture.alpha & np.roll(picture.alpha, 1, 0) & np.roll(picture.alpha, -1, 0)
     assert picture.material[inside, 0] == pytest.approx(0.5, abs=0.05)
 
@@ -84,7 +90,7 @@ def test_light_has_no_dots(monkeypatch: pytest.MonkeyPatch) -> None:
     than chance has it among so many. All noise together takes a tenth at most of the error that other renderers are allowed.
     """
     ball = scenes.sphere(4)
-    look = Look(ball, np.full((len(ball.triangles), 3, 2), 0.5, "f4"), np.full((2, 2, 5), 0.5, "f4"))
+    look = worn(ball, np.full((len(ball.triangles), 3, 2), 0.5, "f4"), np.full((2, 2, 5), 0.5, "f4"))
     view, size = camera(ball.vertices.astype(float), 45, 18), 40
     picture = draw_view(look, preview_light(), view, size)
     monkeypatch.setattr(preview, "RAYS", Quality(lobe=700, light=250, extra=False))
@@ -111,7 +117,7 @@ def test_bumps_too_fine_to_see_make_the_surface_rougher() -> None:
     assert n[0] == pytest.approx([0, 0, 1], abs=0.02)
     assert length[0] == pytest.approx(np.sqrt(1 - 0.09), abs=0.01)
     assert rougher(np.float32([0.2, 0.2]), np.float32([0, 0.05])) == pytest.approx([0.2, 0.1016**0.25], rel=1e-4)
-    look = Look(scene.bumped(bumps), uv, np.full((2, 2, 5), 0.5, "f4"))
+    look = worn(scene.bumped(bumps), uv, np.full((2, 2, 5), 0.5, "f4"))
     flat, bumpy = (draw_view(one, preview_light(), camera(scene.vertices.astype(float), 125, 28), 16).color
                    for one in (replace(look, scene=scene), look))  # fmt: skip
     assert bumpy.max() < 0.9 * flat.max()  # the mirrored sun is spread out
@@ -126,11 +132,11 @@ def test_what_shines_is_added_once_and_filtered_by_footprint() -> None:
     uv, even = sheet_uv(scene), np.array([[[2.0, 0.5, 0.25]]], "f4")
     checks = even * (np.indices((512, 512)).sum(0) % 2)[..., None].astype("f4")
     view = camera(scene.vertices.astype(float), 20, 60)
-    dark = draw_view(Look(scene, uv, np.full((2, 2, 5), 0.5, "f4")), preview_light(), view, 16)
+    dark = draw_view(worn(scene, uv, np.full((2, 2, 5), 0.5, "f4")), preview_light(), view, 16)
     inside = dark.alpha & np.roll(dark.alpha, 1, 0) & np.roll(dark.alpha, -1, 0)
     for image, most in ((even, 1e-5), (checks, 0.1)):
         shining = Scene(scene.vertices, scene.triangles, scene.normals, None, Emission([Texture(image)], np.zeros(2, "i4"), uv))
-        picture = draw_view(Look(shining, uv, np.full((2, 2, 5), 0.5, "f4")), preview_light(), view, 16)
+        picture = draw_view(worn(shining, uv, np.full((2, 2, 5), 0.5, "f4")), preview_light(), view, 16)
         added = picture.color - dark.color
         assert np.abs(added[inside] / (image.mean((0, 1)) * EXPOSURE) - 1).max() < most
         assert (added[~dark.alpha] == 0).all()
@@ -143,7 +149,7 @@ def test_only_what_is_told_to_shines() -> None:
     glow = Emission([Texture(np.ones((1, 1, 3), "f4"))], np.array([0, -1], "i4"), uv)
     maps = np.full((2, 2, 5), 0.5, "f4")
     shining = Scene(scene.vertices, scene.triangles, scene.normals, None, glow)
-    dark, lit = (draw_view(Look(one, uv, maps), preview_light(), view, 16) for one in (scene, shining))
+    dark, lit = (draw_view(worn(one, uv, maps), preview_light(), view, 16) for one in (scene, shining))
     directions = camera_rays(view, FOV_Y, 32, 32)[1]
     hits = scene.intersect(np.broadcast_to(view[:3, 3], directions.shape), directions)
     first = (hits.triangle == 0).reshape(32, 32)
@@ -186,7 +192,7 @@ def test_the_light_is_turned_as_three_and_blender_read_it(tmp_path: Path) -> Non
 
 def test_a_large_picture_is_drawn_in_tiles_without_seams(monkeypatch: pytest.MonkeyPatch) -> None:
     ball = scenes.sphere(3)
-    look = Look(ball, np.full((len(ball.triangles), 3, 2), 0.5, "f4"), np.full((2, 2, 5), 0.5, "f4"))
+    look = worn(ball, np.full((len(ball.triangles), 3, 2), 0.5, "f4"), np.full((2, 2, 5), 0.5, "f4"))
     view = camera(ball.vertices.astype(float), 45, 18)
     whole = draw_view(look, preview_light(), view, 40)
     monkeypatch.setattr(preview, "TILE", 32)

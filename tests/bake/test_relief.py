@@ -79,7 +79,7 @@ def decoded(subject: Subject, maps: Maps) -> tuple[NDArray, NDArray, NDArray, ND
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     assert maps.normal is not None
     weights = np.c_[surface.barycentric, 1 - surface.barycentric.sum(1)]
-    return points, n, baked_bumps(subject.mesh, maps.normal).leaning(n, surface.triangle, weights), on
+    return points, n, baked_bumps(subject.mesh, [maps.normal]).leaning(n, surface.triangle, weights), on
 
 
 def baked(subject: Subject) -> Maps:

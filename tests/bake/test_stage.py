@@ -192,7 +192,7 @@ def test_an_asset_of_an_older_version_is_replaced_and_a_foreign_folder_is_not(tm
     out.mkdir()
     (out / "normal.png").write_text("of an older asset")
     (out / "bake.json").write_text('{"schema": "dreammat.asset", "version": 1, "files": {"normal.png": "0"}}')
-    with pytest.raises(ArtifactError, match=r"bake\.json: dreammat\.asset version 1, expected 2; make it again"):
+    with pytest.raises(ArtifactError, match=r"bake\.json: dreammat\.asset version 1, expected 3; make it again"):
         read_manifest(out, ASSET)
     bake(prep, material, out, SMALL)
     assert not (out / "normal.png").exists()

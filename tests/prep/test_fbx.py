@@ -170,7 +170,7 @@ def test_an_fbx_goes_through_the_stage_to_the_model(tmp_path: Path) -> None:
     check_promises(made)
     assert found["uv_set"] == 1 and made.provenance.extra["source_format"] == "fbx"
     model_parts = source_model(made, double_sided=False).parts
-    slots = [(part.node, part.material, len(part.triangles)) for part in model_parts]
+    slots = [(part.node, part.worn.name, len(part.triangles)) for part in model_parts]
     assert slots == [("Haus", "Ziegel", 4), ("Haus", "Dach", 2)]
     tip = transform_points(model_parts[0].transform, model_parts[0].positions.astype(float))[4]
     np.testing.assert_allclose(tip, [0.08, 0, -0.02], atol=1e-9)  # +z up, centimetres: (8, 2, 0)

@@ -1,0 +1,22 @@
+"""Names for files and for what other programs call things."""
+
+import re
+
+
+def identifier(name: str) -> str:
+    """A name as every target takes it: letters, digits and underscores, the first one no digit."""
+    safe = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "asset"
+    return f"_{safe}" if safe[0].isdigit() else safe
+
+
+def unique(names: list[str]) -> list[str]:
+    """The same names, a number behind each that came before (whatever its case: some file systems know none)."""
+    taken: set[str] = set()
+    result = []
+    for name in names:
+        number, candidate = 2, name
+        while candidate.lower() in taken:
+            number, candidate = number + 1, f"{name}_{number}"
+        taken.add(candidate.lower())
+        result.append(candidate)
+    return result
