@@ -19,6 +19,7 @@ ALLOWED = {
     "conditions": {"core", "light", "material", "prior", "asset"},
     "distill": {"core", "light", "material", "prior", "sd"},
     "bake": {"core", "light", "material", "prior", "asset"},
+    "edit": {"core", "asset", "bake"},
     "train": {"core", "light", "material", "prior", "sd", "asset", "prep", "conditions", "distill", "bake"},
     "report": {"core", "light", "material", "prior", "sd", "asset", "prep", "conditions", "distill", "bake", "train"},
 }

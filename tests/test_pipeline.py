@@ -57,7 +57,7 @@ def test_the_asset_is_complete(whole: tuple[Path, dict[str, float]]) -> None:
     names = {p.name for p in (whole[0] / "asset").iterdir()}
     assert names >= {
         "albedo.exr", "roughness.exr", "metallic.exr", "albedo.png", "orm.png", "model.glb", "model.obj", "model.mtl",
-        "preview.png", "preview.json", "preview_light.exr", "bake.json",
+        "preview.png", "preview.json", "preview_light.exr", "mesh.npz", "bake.json",
     }  # fmt: skip
 
 

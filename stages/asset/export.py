@@ -17,7 +17,7 @@ from pathlib import Path
 from stages.asset.folder import Asset, read_asset
 from stages.asset.options import ExportOptions
 from stages.asset.pictures import copy_model
-from stages.core.artifact import Provenance, peek, plain_options, read_manifest, reason, write_manifest
+from stages.core.artifact import Provenance, Schema, peek, plain_options, read_manifest, reason, write_manifest
 from stages.core.errors import InputError, OutputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import EXPORT
@@ -58,7 +58,7 @@ def export(
     with made_beside(out) as scratch:
         files = write(opened, scratch)
         write_manifest(scratch, EXPORT, wanted, files)
-        move_into(scratch, out, files)
+        move_into(scratch, out, files, EXPORT)
     progress(f"export for {options.target}", 1, 1)
     return ExportResult(out, False, sizes_of(out, files))
 
@@ -97,21 +97,27 @@ def made_beside(out: Path) -> Iterator[Path]:
             shutil.rmtree(scratch, ignore_errors=True)
 
 
-def move_into(scratch: Path, out: Path, files: list[str]) -> None:
-    """Put finished files in their place: the folder at once where there is none, else file by file, manifest last."""
+def move_into(scratch: Path, out: Path, files: list[str], schema: Schema) -> None:
+    """Put finished files in their place: the folder at once where there is none, else file by file, manifest last.
+
+    What an earlier folder of the same schema had besides goes when the new files are there.
+
+    Raises: OutputError where a file in the way is another's.
+    """
     if not out.exists():
         os.rename(scratch, out)
         return
-    old = read_manifest(out, EXPORT)[1] if peek(out, EXPORT) else {}
+    old = read_manifest(out, schema)[1] if peek(out, schema) else {}
     foreign = next((name for name in files if name not in old and (out / name).exists()), None)
     if foreign or not out.is_dir():
-        raise OutputError(f"{out / (foreign or '')}: is there and not an export's; move it, or give another folder")
-    (out / EXPORT.manifest).unlink(missing_ok=True)
-    for name in old:
-        (out / name).unlink(missing_ok=True)
-    for name in [*files, EXPORT.manifest]:
+        raise OutputError(f"{out / (foreign or '')}: is there and not this command's; move it, or give another folder")
+    (out / schema.manifest).unlink(missing_ok=True)
+    for name in files:
         (out / name).parent.mkdir(parents=True, exist_ok=True)
         os.replace(scratch / name, out / name)
+    for name in set(old) - set(files):
+        (out / name).unlink(missing_ok=True)
+    os.replace(scratch / schema.manifest, out / schema.manifest)
 
 
 def _umask() -> int:

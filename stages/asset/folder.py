@@ -11,6 +11,9 @@ from stages.core.schemas import ASSET
 
 MODEL = "model.glb"
 
+MESH = "mesh.npz"
+"""The prep.npz that an asset is baked from."""
+
 
 @dataclass(frozen=True)
 class Asset:
@@ -40,10 +43,15 @@ class Asset:
 
 def read_asset(folder: Path) -> Asset:
     """Open an asset folder. Raises: ArtifactError that names the file and what to do."""
-    if folder.is_dir() and not (folder / ASSET.manifest).exists():
-        raise ArtifactError(f"{folder}: holds no {ASSET.manifest}; expected a folder that `dreammat bake` wrote")
-    provenance, files = read_manifest(folder, ASSET)
+    provenance, files = asset_manifest(folder)
     if sha256_file(folder / MODEL) != files.get(MODEL):
         raise ArtifactError(f"{folder / MODEL}: not the file that {ASSET.manifest} lists; bake the asset again")
     name = identifier(Path(str(provenance.extra.get("source_name", "asset"))).stem)
     return Asset(folder, name, provenance, read_model(folder / MODEL), sha256_file(folder / ASSET.manifest))
+
+
+def asset_manifest(folder: Path) -> tuple[Provenance, dict[str, str]]:
+    """How an asset was made, and its files' hashes. Raises: ArtifactError."""
+    if folder.is_dir() and not (folder / ASSET.manifest).exists():
+        raise ArtifactError(f"{folder}: holds no {ASSET.manifest}; expected a folder that `dreammat bake` wrote")
+    return read_manifest(folder, ASSET)

@@ -1,6 +1,6 @@
 """What a baked material is: its maps by name."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,3 +33,13 @@ class Maps:
     def metallic(self) -> NDArray[np.float32]:
         """(H, W)."""
         return self.material[..., 4]
+
+    def stored(self) -> "Maps":
+        """The same, rounded to what the masters hold, so that every other file follows from these."""
+        normal, occlusion = (None if values is None else half(values) for values in (self.normal, self.occlusion))
+        return replace(self, material=half(self.material), normal=normal, occlusion=occlusion)
+
+
+def half(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Rounded to half floats."""
+    return values.astype(np.float16).astype(np.float32)

@@ -7,14 +7,14 @@ glTF conventions: albedo.png is sRGB; orm.png is linear, R occlusion (1 where no
 normal.png is linear, (n + 1) / 2, +Y up.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.asset.maps import Maps
-from stages.core.artifact import write_exr
+from stages.core.artifact import read_exr, write_exr
 from stages.core.color import srgb_decode
 from stages.core.images import write_png
 from stages.core.parallel import in_parallel
@@ -99,6 +99,20 @@ def masters(maps: Maps) -> dict[str, Callable[[], dict[str, NDArray]]]:
     if height is not None:
         made["height.exr"] = lambda: {"Y": height}
     return made
+
+
+def read_masters(paths: Mapping[str, Path]) -> Maps:
+    """The maps that masters hold. Args: paths: by name of the map, "albedo" to "height". Raises: ArtifactError."""
+    found = {name: _pixels(path) for name, path in paths.items()}
+    material = np.dstack([found["albedo"], found["roughness"], found["metallic"]])
+    grey = {name: found[name][..., 0] if name in found else None for name in ("height", "occlusion")}
+    return Maps(material, grey["height"], found.get("normal"), grey["occlusion"])
+
+
+def _pixels(path: Path) -> NDArray[np.float32]:
+    """(H, W, C), colours in the order R, G, B."""
+    channels = read_exr(path).channels
+    return np.stack([channels[name] for name in ("R", "G", "B") if name in channels] or [channels["Y"]], -1).astype(np.float32)
 
 
 def _colour(values: NDArray) -> dict[str, NDArray]:

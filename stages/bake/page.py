@@ -3,7 +3,6 @@
 import functools
 import importlib.metadata
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from stages.asset.report_view import PageLight
 from stages.bake.checks import Facts, checks
 from stages.bake.preview import Look, draw_view
 from stages.bake.studio import BACKDROP, EXPOSURE, FOV_Y, GROUND, VIEWS, backdrop, camera
-from stages.core.artifact import Artifact
+from stages.core.artifact import Artifact, Provenance
 from stages.core.color import srgb_encode
 from stages.core.progress import Progress
 from stages.core.texture_sets import TextureSet
@@ -64,26 +63,27 @@ def softbox() -> Environment:
 
 
 def report_page(
-    out: Path, mesh: Artifact, made: Artifact, look: Look, facts: list[Facts],
-    files: list[str], said: dict[str, Any], size: int, progress: Progress,
+    out: Path, mesh: Artifact, made: Provenance, look: Look, facts: list[Facts],
+    files: list[str], size: int, progress: Progress,
 ) -> str:  # fmt: skip
     """Write report.html.
 
     Args:
-        look: the mesh as it is shown. facts: of each texture set. said: what bake.json says. size: pixels of a picture.
+        made: what bake.json says. look: the mesh as it is shown. facts: of each texture set. size: pixels of a picture.
     Returns:
         the file's name.
     """
     progress("report", 0, 1)
+    said = made.extra
     source = str(said["source_name"])
-    lights, sets = suspects(tuple(made.provenance.extra["environments"])), [TextureSet.from_json(of) for of in said["sets"]]
+    lights, sets = suspects(tuple(said["environments"])), [TextureSet.from_json(of) for of in said["sets"]]
     page = Page(
         name=Path(source).stem,
         prompt=str(said["prompt"] or ""),
         meta=f"{source}, {len(mesh['triangles']):,} triangles, {extent(sets)}",
         checks=checks(mesh, sets, facts, look.scene, lights, said),
         shots=pictures(look, max(32, 4 * size // 5 // 2 * 2)),
-        facts=how_made(mesh, made, said),
+        facts=how_made(mesh, made),
         licences=[*LICENCES, *([SD_LICENCE] if str(said["guidance"].get("name")) == "sd" else [])],
         light=page_light(),
         view=first_view(look.scene),
@@ -136,18 +136,21 @@ def first_view(scene: Scene) -> PageView:
     return PageView(azimuth, elevation, float(FOV_Y), float(max(distances)), (GROUND, BACKDROP))
 
 
-def how_made(mesh: Artifact, made: Artifact, said: dict[str, Any]) -> dict[str, str]:
+def how_made(mesh: Artifact, made: Provenance) -> dict[str, str]:
     """How the asset was made, in words."""
+    said = made.extra
     guidance = dict(said["guidance"])
     name = str(guidance.pop("name", ""))
     found = {key: value for key, value in said["findings"].items() if isinstance(value, int | float) and value}
-    options = {**mesh.provenance.options, **made.provenance.options}
+    options = {**mesh.provenance.options, **said["distilled_with"]}
     chosen = ("quality", "steps", "views", "up", "uv", "padding", "texture_size", "crease_angle")
+    edits = {"Edits": "; ".join(said["edited"]["list"])} if "edited" in said else {}
     return {
         "Prompt": str(said["prompt"] or "none"),
-        "Seed": str(made.provenance.seed),
+        **edits,
+        "Seed": str(made.seed),
         "Guidance": ", ".join([name, *(f"{key} {value[:12]}" for key, value in guidance.items() if isinstance(value, str))]),
-        "Lights": ", ".join(made.provenance.extra["environments"]) or "none",
+        "Lights": ", ".join(said["environments"]) or "none",
         "UVs": "the source's own" if said["uv_kept"] else "made new",
         "Material slots": ", ".join(slot or "(unnamed)" for slot in said["material_slots"]),
         "Found in the mesh": ", ".join(f"{key.replace('_', ' ')} {value:,}" for key, value in found.items()) or "nothing",

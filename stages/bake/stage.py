@@ -1,7 +1,9 @@
 """The bake stage: prep.npz and material.npz in, a folder with textures, models and a preview out."""
 
+import os
+import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +13,7 @@ import torch
 from numpy.typing import NDArray
 
 from stages.asset import gltf
+from stages.asset.folder import MESH
 from stages.asset.gltf import write_glb
 from stages.asset.maps import Maps
 from stages.asset.model import source_model
@@ -42,6 +45,7 @@ from stages.core.artifact import (
     run_log,
     sha256_file,
     write_manifest,
+    written_atomically,
 )
 from stages.core.errors import ArtifactError, OutputError
 from stages.core.images import write_png
@@ -53,6 +57,9 @@ from stages.light.scene import Scene
 from stages.material.learnt import LearntMaterial
 from stages.material.relief import bounded
 from stages.material.residual import combined
+
+SAID_OF_OPTIONS = ("quality", "steps")
+"""Options of `distill` that bake.json repeats."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +76,14 @@ class BakeResult:
 class Subject:
     """The mesh, ready to trace and to bake.
 
-    open: whether the backs of its triangles can be seen. set: the texture set that is baked, layout: what lies on its texture,
-    touched: (size, size) the surface point of each of its texels.
+    open: whether the backs of its triangles can be seen. set: the texture set that is baked, triangles: (F,) whether they show
+    it, layout: what lies on its texture, touched: (size, size) the surface point of each of its texels.
     """
 
     mesh: Artifact
     scene: Scene
     open: bool
+    triangles: NDArray[np.bool_]
     layout: Layout
     touched: Surface
     set: TextureSet = ONE_SET
@@ -100,12 +108,13 @@ def subjects(prep: Path, mesh: Artifact, sets: list[TextureSet]) -> Iterator[Sub
     """
     scene, open_mesh, of_triangle = traced_scene(mesh), is_open(mesh["triangles"]), triangle_sets(mesh)
     for number, chosen in enumerate(sets):
-        layout = Layout.of(mesh["uv"], chosen.size, mesh["charts"], of_triangle == number)
+        mine = of_triangle == number
+        layout = Layout.of(mesh["uv"], chosen.size, mesh["charts"], mine)
         touched = touched_texels(layout)
         if not signed_area(layout.uv).any() or not (touched.triangle >= 0).any():
             named = f" of set {chosen.name}" if chosen.name else ""
             raise ArtifactError(f"{prep}: its UVs cover no texel of {chosen.size}{named}; make it again with new UVs")
-        yield Subject(mesh, scene, open_mesh, layout, touched, chosen)
+        yield Subject(mesh, scene, open_mesh, mine, layout, touched, chosen)
 
 
 def bake(
@@ -135,24 +144,23 @@ def bake(
     learnt = LearntMaterial.of(material, made, options.library)
     with run_log(out) as measured:
         sets = [replace(chosen, size=options.size) for chosen in texture_sets(mesh.provenance)]
-        open_folder(out)
+        open_folder(out, prep)
         shown, covered = list[Shown](), list[Covered]()
         for subject in subjects(prep, mesh, sets):
             maps, on_charts = bake_maps(subject, made, learnt, options, progress)
-            shown.append(write_set(out, subject, with_normals(subject, maps), progress))
+            shown.append(write_set(out, subject, with_normals(subject, maps).stored(), progress))
             covered.append(on_charts)
-        files, look, notes = write_asset(out, subject, shown, options.preview_size, progress)
-        report = {**describe(mesh, made), **shares(covered), **notes, "sets": [of.to_json() for of in sets]}
-        facts = [of.facts for of in shown]
-        files.append(report_page(out, mesh, made, look, facts, files, report, options.preview_size, progress))
-        write_manifest(out, ASSET, Provenance(wanted.options, wanted.seed, inputs, report), files)
+        extra = {**describe(mesh, made), **shares(covered), "sets": [of.to_json() for of in sets]}
+        files, report = write_asset(out, (prep, subject), shown, replace(wanted, extra=extra), progress)
         measured["texture_size"] = max(of.size for of in sets)
     return BakeResult(out, False, sorted(files), report)
 
 
-def open_folder(out: Path) -> None:
+def open_folder(out: Path, prep: Path) -> None:
     """Make the folder; where it holds an earlier asset, of whatever version, take that away, its manifest first.
 
+    Args:
+        prep: what is baked, which stays if it lies there.
     Raises: OutputError, also where a file of another program has the manifest's name.
     """
     manifest = out / ASSET.manifest
@@ -164,7 +172,9 @@ def open_folder(out: Path) -> None:
         tempfile.TemporaryFile(dir=out).close()
         manifest.unlink(missing_ok=True)
         for name in old.get("files") or {}:
-            (out / Path(name).name).unlink(missing_ok=True)
+            file = out / Path(name).name
+            if not (file.exists() and file.samefile(prep)):
+                file.unlink(missing_ok=True)
     except OSError as error:
         raise OutputError(f"{out}: cannot be written: {reason(error)}; give a folder that can") from error
 
@@ -285,6 +295,39 @@ def views_of(made: Artifact) -> Views:
 
 
 def write_asset(
+    out: Path, of: tuple[Path, Subject], shown: list[Shown], made: Provenance, progress: Progress, kept: Sequence[str] = ()
+) -> tuple[list[str], dict[str, Any]]:
+    """Write all that follows from the maps of texture sets that are written, the mesh, and the manifest.
+
+    Args:
+        of: prep.npz and what it holds. made: how the asset is made, and what is known of it so far. kept: further files of the
+        asset that are there already.
+    Returns:
+        the files' names, textures too; what bake.json says, with what the models could not hold.
+    """
+    prep, subject = of
+    size = int(made.options["preview_size"])
+    files, look, notes = write_models(out, subject, shown, size, progress)
+    files += [keep_mesh(out, prep), *kept]
+    made = replace(made, extra={**made.extra, **notes})
+    files.append(report_page(out, subject.mesh, made, look, [one.facts for one in shown], files, size, progress))
+    write_manifest(out, ASSET, made, files)
+    return files, made.extra
+
+
+def keep_mesh(out: Path, prep: Path) -> str:
+    """Leave what was baked in the asset too, by which it is edited: the same file where the file system can, else a copy."""
+    kept = out / MESH
+    if not (kept.exists() and kept.samefile(prep)):
+        with written_atomically(kept) as temporary:
+            try:
+                os.link(prep, temporary)
+            except OSError:  # another file system, or one without links
+                shutil.copyfile(prep, temporary)
+    return MESH
+
+
+def write_models(
     out: Path, subject: Subject, shown: list[Shown], preview_size: int, progress: Progress
 ) -> tuple[list[str], Look, dict[str, int]]:
     """Write models and preview of texture sets that are written.
@@ -321,5 +364,6 @@ def describe(mesh: Artifact, made: Artifact) -> dict[str, Any]:
     return {
         **{key: source[key] for key in ("source_name", "source_format", "uv_kept", "findings")},
         **{key: material[key] for key in ("prompt", "guidance", "environments")},
+        "distilled_with": {key: made.provenance.options[key] for key in SAID_OF_OPTIONS if key in made.provenance.options},
         "material_slots": list(dict.fromkeys(part["material"] for part in source["parts"])),
     }

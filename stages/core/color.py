@@ -42,6 +42,23 @@ def luminance(rgb: Array) -> Array:
     return r * rgb[..., 0] + g * rgb[..., 1] + b * rgb[..., 2]
 
 
+TO_LMS = np.array([[0.4122214708, 0.5363325363, 0.0514459929], [0.2119034982, 0.6806995451, 0.1073969566],
+                   [0.0883024619, 0.2817188376, 0.6299787005]])  # fmt: skip
+TO_LAB = np.array([[0.2104542553, 0.7936177850, -0.0040720468], [1.9779984951, -2.4285922050, 0.4505937099],
+                   [0.0259040371, 0.7827717662, -0.8086757660]])  # fmt: skip
+FROM_LMS, FROM_LAB = np.linalg.inv(TO_LMS), np.linalg.inv(TO_LAB)
+
+
+def to_oklab(linear: NDArray) -> NDArray:
+    """Linear Rec. 709 to OKLab. Args: (3, P). Returns: (3, P). Source: Ottosson 2020, "A perceptual color space"."""
+    return TO_LAB @ np.cbrt(TO_LMS @ linear)
+
+
+def from_oklab(lab: NDArray) -> NDArray:
+    """OKLab to linear Rec. 709, which may lie outside of 0 … 1. Args: (3, P). Returns: (3, P)."""
+    return FROM_LMS @ (FROM_LAB @ lab) ** 3
+
+
 REC709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 """CIE 1931 x and y of red, green, blue and white, as files give them; the white is D65."""
 

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.color import srgb_decode
+from stages.core.color import from_oklab as from_any_oklab
+from stages.core.color import srgb_decode, to_oklab
 from stages.core.parallel import compiled
 from stages.material.place import Place
 
@@ -85,23 +86,9 @@ def tint(color: Array, warm: Array, green: Array | float = 0.0) -> Array:
     return color * np.exp(WARM * warm + GREEN * green)
 
 
-TO_LMS = np.array([[0.4122214708, 0.5363325363, 0.0514459929], [0.2119034982, 0.6806995451, 0.1073969566],
-                   [0.0883024619, 0.2817188376, 0.6299787005]])  # fmt: skip
-TO_LAB = np.array([[0.2104542553, 0.7936177850, -0.0040720468], [1.9779984951, -2.4285922050, 0.4505937099],
-                   [0.0259040371, 0.7827717662, -0.8086757660]])  # fmt: skip
-
-
-def to_oklab(linear: NDArray) -> NDArray:
-    """Linear Rec. 709 to OKLab. Args: (3, P). Returns: (3, P). Source: Ottosson 2020, "A perceptual color space"."""
-    return TO_LAB @ np.cbrt(TO_LMS @ linear)
-
-
-FROM_LMS, FROM_LAB = np.linalg.inv(TO_LMS), np.linalg.inv(TO_LAB)
-
-
 def from_oklab(lab: NDArray) -> NDArray:
     """OKLab to linear Rec. 709, clamped to 0 … 1. Args: (3, P). Returns: (3, P)."""
-    return np.clip(FROM_LMS @ (FROM_LAB @ lab) ** 3, 0, 1)
+    return np.clip(from_any_oklab(lab), 0, 1)
 
 
 def each(t: Array, shown: Array | float, *stops: str) -> Array:

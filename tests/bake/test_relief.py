@@ -1,5 +1,6 @@
 """The normal map of a height map, decoded as a client does, beside the analytic normals of the same bumps."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -149,7 +150,7 @@ def test_relief_adds_to_the_normal_map_that_is_there(tmp_path: Path) -> None:
     count = len(plain.mesh["triangles"])
     tangents = np.broadcast_to(np.array([1, 0, 0, 1], "f4"), (count, 3, 4))
     scene = plain.scene.bumped(NormalMaps([own], np.zeros(count, "i4"), np.zeros((count, 3, 2), "f4"), tangents))
-    subject = Subject(plain.mesh, scene, plain.open, plain.layout, plain.touched)
+    subject = replace(plain, scene=scene)
     on = subject.touched.triangle >= 0
     height = np.zeros((SIZE, SIZE), "f4")
     height[on] = 0.5 * subject.points(subject.touched.where(on))[0][:, 1]

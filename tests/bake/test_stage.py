@@ -64,10 +64,12 @@ def test_all_files_are_there_and_the_manifest_knows_their_hashes(constant_asset:
     folder = constant_asset / "asset"
     provenance, files = read_manifest(folder, ASSET)
     obj = {"roughness.png", "metallic.png", "model.obj", "model.mtl"}
-    assert set(files) == TEXTURES | obj | {"model.glb", "preview.png", "preview.json", "preview_light.exr", "report.html"}
+    assert set(files) == TEXTURES | obj | {
+        "model.glb", "preview.png", "preview.json", "preview_light.exr", "report.html", "mesh.npz",
+    }  # fmt: skip
     assert all(sha256_file(folder / name) == digest for name, digest in files.items())
     assert {path.name for path in folder.iterdir()} == {*files, "bake.json", "run.json"}
-    assert provenance.inputs["prep"] == sha256_file(constant_asset / "prep.npz")
+    assert provenance.inputs["prep"] == sha256_file(constant_asset / "prep.npz") == files["mesh.npz"]
     assert (provenance.seed, provenance.extra["prompt"]) == (5, "a thing")
     assert provenance.extra["unseen"] == pytest.approx(1 / 6, abs=1e-3)  # the bottom
     assert provenance.extra["coverage"] == pytest.approx(0.96**2 * 2 / 3, abs=0.01)
