@@ -27,6 +27,8 @@ DEFAULT = defaults(PrepOptions)
 @click.option("--uv", type=click.Choice(["auto", "keep", "mend", "new"]), default=DEFAULT["uv"], show_default=True,
               help="Keep the source's UVs where they give texels to the surface, insist on them, also give the few faces "
                    "without texels charts in free space, or always make new ones.")
+@click.option("--own-instances", is_flag=True,
+              help="Texels for each place that a mesh stands in, in new UVs, instead of one texture for all of them.")
 @click.option("--unwrap-seconds", type=click.FloatRange(0), default=DEFAULT["unwrap_seconds"], show_default=True,
               metavar="SECONDS", help="Time that xatlas may take before simpler charts are made.")
 @click.option("--unwrap-triangles", type=click.IntRange(0), default=DEFAULT["unwrap_triangles"], show_default=True,

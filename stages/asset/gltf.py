@@ -168,21 +168,31 @@ class _Buffer:
 
 
 def _scene(model: Model, materials: list[Worn], buffer: _Buffer) -> tuple[list[dict], list[dict], list[int]]:
-    """Meshes, nodes and the indices of the root nodes: a node and a mesh for each run of parts on one node."""
+    """Meshes, nodes and the indices of the root nodes: a node for each run of parts on one node, a mesh for those alike."""
     meshes: list[dict[str, Any]] = []
     nodes: list[dict[str, Any]] = []
     roots: list[int] = []
-    previous: Part | None = None
-    for part in model.parts:
-        if previous is None or not _same_node(previous, part):
-            meshes.append({"name": part.name, "primitives": []})
-            roots.append(_add_node(nodes, part, len(meshes) - 1))
-        meshes[-1]["primitives"].append(_primitive(part, materials, buffer))
-        previous = part
+    known: dict[tuple, int] = {}
+    for run in _runs(model.parts):
+        key = tuple((id(part.positions), id(part.triangles)) for part in run)  # instances share their arrays
+        if key not in known:
+            known[key] = len(meshes)
+            meshes.append({"name": run[0].name, "primitives": [_primitive(part, materials, buffer) for part in run]})
+        roots.append(_add_node(nodes, run[0], known[key]))
     if not np.array_equal(model.upright, np.eye(4)):
         nodes.append({"name": "upright", "children": roots, "matrix": _columns(model.upright)})
         roots = [len(nodes) - 1]
     return meshes, nodes, roots
+
+
+def _runs(parts: list[Part]) -> list[list[Part]]:
+    """Parts one after another that stand on one node."""
+    runs: list[list[Part]] = []
+    for part in parts:
+        if not runs or not _same_node(runs[-1][-1], part):
+            runs.append([])
+        runs[-1].append(part)
+    return runs
 
 
 def _same_node(a: Part, b: Part) -> bool:

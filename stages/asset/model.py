@@ -4,7 +4,7 @@ Per corner, positions, UVs and face order are the source's, bit for bit; a polyg
 """
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,8 @@ class Part:
     """One material of one node.
 
     transform: (4, 4) local to source frame. positions, normals: (N, 3) float32, local. uv: (N, 2), v down. tangents:
-    (N, 4), or None without a normal map. triangles: (T, 3) uint32. Parts that share a vertex table share its arrays.
+    (N, 4), or None without a normal map. triangles: (T, 3) uint32. Parts that share a vertex table share its arrays, and
+    instances all of them.
     """
 
     name: str
@@ -81,6 +82,8 @@ def source_model(prep: Artifact, double_sided: bool, normal_mapped: Collection[s
     triangles, part, row = triangles[usable], prep["face_part"][face[usable]], of_face[face[usable]]
     parts: dict[tuple[int, int], Part] = {}
     for numbers, start, stop in vertex_runs(prep):
+        if all(infos[number].get("instance_of", -1) >= 0 for number in numbers):
+            continue
         loops = np.flatnonzero(np.isin(loop_parts(prep), numbers))
         kinds = [uv, normals] if tangents is None else [uv, normals, tangents]
         table = split_vertices(prep["loop_vertex"], loops, kinds, start, stop)
@@ -91,8 +94,21 @@ def source_model(prep: Artifact, double_sided: bool, normal_mapped: Collection[s
             for shown in np.unique(row[part == number]).tolist():
                 indices = table.of_loop[triangles[(part == number) & (row == shown)]].astype(np.uint32)
                 parts[number, shown] = _part(infos[number], worn[shown], arrays, frames if number in bumpy else None, indices)
+    parts |= instances(infos, parts)
     in_order = [parts[key] for key in sorted(parts)]
     return Model(in_order, upright(prep["to_world"]), double_sided or bool(flipped_loops(prep).any()), notes)
+
+
+def instances(infos: list[dict[str, Any]], parts: dict[tuple[int, int], Part]) -> dict[tuple[int, int], Part]:
+    """The parts that are instances of those given, whose arrays they share. Args: parts: by number and material."""
+    of_first: dict[int, list[tuple[int, Part]]] = {}
+    for (number, shown), part in parts.items():
+        of_first.setdefault(number, []).append((shown, part))
+    return {
+        (number, shown): replace(part, node=str(info["node"] or info["name"] or "mesh"), transform=transform_of(info))
+        for number, info in enumerate(infos)
+        for shown, part in of_first.get(info.get("instance_of", -1), [])
+    }
 
 
 def _part(

@@ -34,7 +34,8 @@ PREP = Schema(
         "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, v up
     },
     # source_format: "obj" | "ply" | "stl" | "off" | "glb" | "fbx" | "usd"; uv_kept: bool; findings: what was found and mended;
-    # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row)}
+    # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row), "instance_of"
+    # (the first part of the same mesh and slot, whose texels it shows, or -1)}
     # shared_texels: whether a texel may show more than one place, see `core.tiles`
     # sets: texture sets, at least one, as `core.texture_sets` has them
     # groups: names of an OBJ's groups; passed_on: what materials of a glTF had besides, see `stages.asset.passed_on`

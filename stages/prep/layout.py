@@ -105,7 +105,12 @@ def keep(triangles: NDArray, uv: NDArray, area: NDArray, missing: NDArray, new: 
     if shared < SHARED:
         return Kept(uv_charts(triangles, uv), bool(lost.any() or missing.any()), told)
     told.append(f"{_percent(shared)} of the texels are shared by stacked, mirrored or repeated islands")
-    return Kept(_ranked(_one_sided(triangles, uv), area), True, told)
+    return Kept(sharing(triangles, uv, area), True, told)
+
+
+def sharing(triangles: NDArray, uv: NDArray, area: NDArray) -> NDArray[np.int32]:
+    """Charts (F,) of a layout whose islands share texels; of those that do the largest in space is the lowest."""
+    return _ranked(_one_sided(triangles, uv), area)
 
 
 def with_neighbours(uv: NDArray[np.float32], triangles: NDArray, polygon: NDArray) -> NDArray[np.float32]:
@@ -160,7 +165,7 @@ def _cover(uv: NDArray) -> NDArray[np.int32]:
 
 def _alike(triangles: NDArray, uv: NDArray, area: NDArray) -> bool:
     """Whether islands that share texels are of one size."""
-    found = Representatives(uv, _ranked(_one_sided(triangles, uv), area))
+    found = Representatives(uv, sharing(triangles, uv, area))
     rng = np.random.default_rng(0)
     face = rng.choice(len(uv), SAMPLES, p=area / area.sum()).astype(np.int32)
     scale = found.scale(area, face, found.of(face, rng.dirichlet((1, 1, 1), SAMPLES))[0])

@@ -15,6 +15,7 @@ class PrepOptions:
     weld_tolerance: vertices closer than this are one, in diagonals of the bounding box.
     uv: "auto" keeps the source's UVs where they give texels to the surface, "keep" insists on them, "mend" also gives the faces
         without texels charts in free space, "new" always makes new ones.
+    own_instances: a mesh that stands in several places gets texels for each of them, in new UVs.
     unwrap_seconds: after this, xatlas is stopped and the charts are made by direction of the normal instead.
     unwrap_triangles: a larger mesh does not try xatlas, which there takes minutes and packs no denser.
     """
@@ -25,5 +26,6 @@ class PrepOptions:
     crease_angle: float = 40.0
     weld_tolerance: float = 1e-6
     uv: str = "auto"
+    own_instances: bool = False
     unwrap_seconds: float = 60.0
     unwrap_triangles: int = 50_000

@@ -25,12 +25,16 @@ def nothing_passed_on() -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Part:
-    """The faces of one material slot on one node. transform: node to source frame, 16 numbers, row by row."""
+    """The faces of one material slot on one node. transform: node to source frame, 16 numbers, row by row.
+
+    instance_of: the first part of the same mesh and slot, whose texels this one shows; -1 where it has its own.
+    """
 
     name: str
     material: str = ""
     node: str = ""
     transform: tuple[float, ...] = IDENTITY
+    instance_of: int = -1
 
 
 @dataclass(frozen=True)

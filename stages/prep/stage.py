@@ -1,7 +1,7 @@
 """The `prep` stage: from a mesh file to `prep.npz`."""
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,8 @@ from stages.core.schemas import PREP
 from stages.core.texture_sets import TextureSet
 from stages.core.tiles import flat
 from stages.prep.gltf_file import companions
-from stages.prep.layout import Kept, keep, sound, unusable, with_neighbours
+from stages.prep.instances import firsts, like_the_first, told, with_instances
+from stages.prep.layout import Kept, keep, sharing, sound, unusable, with_neighbours
 from stages.prep.measure import topology
 from stages.prep.mend import mended
 from stages.prep.normals import authored, face_normals, shading_normals
@@ -65,6 +66,7 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
     with run_log(out):
         progress("read", 0, 4)
         source = READERS[mesh.suffix.lower()](mesh)
+        source = source if options.own_instances else with_instances(source)
         progress("mend", 1, 4)
         working = repair(source, options.up, options.weld_tolerance, mesh)
         normals, findings = oriented(source, working, options.crease_angle)
@@ -139,10 +141,12 @@ def _with_bakeable_uv(
     """
     if options.uv == "new":
         return source, {"unusable_uv": "new ones asked for", "uv_set": None}
+    if options.own_instances and any(part.instance_of >= 0 for part in with_instances(source).parts):
+        return source, {"unusable_uv": "instances are to have texels of their own", "uv_set": None}
     _, area = face_normals(working.vertices, working.triangles)
-    problems = []
+    problems, own = [], firsts(source, working.loops)
     for number, candidate in enumerate(source.by_uv_set()):
-        problems.append(unusable(working.triangles, loop_uvs(candidate)[working.loops], area))
+        problems.append(unusable(working.triangles[own], loop_uvs(candidate)[working.loops[own]], area[own]))
         if problems[-1] is None:
             return candidate, {"unusable_uv": None, "uv_set": number}
     if options.uv in ("keep", "mend"):
@@ -164,14 +168,16 @@ def _texture(
         if options.uv == "mend":
             uv[working.loops] = _mended(uv[working.loops], working, polygon, path)
         uv[working.loops] = with_neighbours(uv[working.loops], working.triangles, polygon)
-        return _everywhere(uv, working), {"unwrap": "kept", "gutter": None}
-    seconds = options.unwrap_seconds if len(polygon) <= options.unwrap_triangles else 0.0
+        return _everywhere(like_the_first(source, uv), working), {"unwrap": "kept", "gutter": None}
+    own = firsts(source, working.loops)
+    seconds = options.unwrap_seconds if own.sum() <= options.unwrap_triangles else 0.0
     layout = unwrap(
-        working.vertices, working.triangles, polygon, options.texture_size, options.padding, seconds
+        working.vertices, working.triangles[own], polygon[own], options.texture_size, options.padding, seconds
     )  # fmt: skip
     made = np.full((len(source.loop_vertex), 2), np.nan, np.float32)
-    made[working.loops] = np.clip(layout.uv, 0, 1)
-    return _everywhere(made, working), {"unwrap": layout.method, "gutter": layout.packing.gutter}
+    made[working.loops[own]] = np.clip(layout.uv, 0, 1)
+    made = _everywhere(like_the_first(source, made), working)
+    return made, {"unwrap": layout.method, "gutter": layout.packing.gutter}
 
 
 def _mended(uv: NDArray, working: Working, polygon: NDArray, path: Path) -> NDArray[np.float32]:
@@ -185,13 +191,17 @@ def _mended(uv: NDArray, working: Working, polygon: NDArray, path: Path) -> NDAr
 
 def _charts(source: Source, working: Working, uv: NDArray, problem: str | None) -> Kept:
     """Charts of UVs (F, 3, 2), and what was found and done."""
+    area = face_normals(working.vertices, working.triangles)[1]
     if problem is not None:
-        return Kept(uv_charts(working.triangles, uv), False, [f"made new: {problem}"])
+        said = [f"made new: {problem}", *told(source)]
+        if len(said) > 1:
+            return Kept(sharing(working.triangles, uv, area), True, said)
+        return Kept(uv_charts(working.triangles, uv), False, said)
     given = sound(loop_uvs(source)[working.loops])
     missing = ~np.asarray(np.isfinite(given).all((1, 2)))
     new = ~flat(uv) & (missing | (given != uv).any((1, 2)))
-    area = face_normals(working.vertices, working.triangles)[1]
-    return keep(working.triangles, uv, area, missing, new)
+    found = keep(working.triangles, uv, area, missing, new)
+    return replace(found, told=[*found.told, *told(source)])
 
 
 def _everywhere(uv: NDArray, working: Working) -> NDArray[np.float32]:
