@@ -114,15 +114,13 @@ def inverses(period):  # type: ignore[no-untyped-def]
 
 class Octave(NamedTuple):
     """One octave of noise. scale: lattice cells a metre along each axis. period: in cells. shift: of the lattice, three
-    numbers. seed: uint32. seen, wide: log2 of its wavelength, metres, along the axis where it is shortest, by which it fades,
-    and along one that is not stretched. strength: its deviation."""
+    numbers. seed: uint32. widest: footprint that hides all of it, metres. strength: its deviation."""
 
     scale: tuple[float, float, float]
     period: Period
     shift: tuple[float, float, float]
     seed: np.uint32
-    seen: float
-    wide: float
+    widest: float
     strength: float
 
 
@@ -134,23 +132,23 @@ class Shape(NamedTuple):
 
 
 @fast
-def add_octave(x, y, z, octave, level, envelope, shape, total):  # type: ignore[no-untyped-def]
-    """Add gradient noise, mean 0, features about one cell across, faded by how little of it a footprint lets be seen. Source:
-    Perlin 2002, "Improving noise".
+def add_octave(x, y, z, octave, footprint, envelope, shape, total):  # type: ignore[no-untyped-def]
+    """Add gradient noise, mean 0, features about one cell across, faded by how little of it a footprint lets be seen
+    (`patterns.fading`). Source: Perlin 2002, "Improving noise".
 
-    x, y, z: (P,) metres. level: (P,) log2 of the footprint, metres. envelope: (P,) by which it is multiplied, or (0,). total:
+    x, y, z, footprint: (P,) metres. envelope: (P,) by which it is multiplied, or (0,). total:
     (P,).
     """
-    none, one = np.float32(0), np.float32(1)
+    none, one, most = np.float32(0), np.float32(1), np.float32(1.01)
     period = singles(octave.period)
     inverse, scale, shift = inverses(period), singles(octave.scale), singles(octave.shift)
-    number, seen, wide, strength = octave.seed, np.float32(octave.seen), np.float32(octave.wide), np.float32(octave.strength)
+    number, scarce, strength = octave.seed, np.float32(1 / octave.widest), np.float32(octave.strength)
     tails, skew = np.float32(shape.tails), np.float32(shape.skew)
     varied = len(envelope) > 0
     for i in range(len(x)):
         qx, qy, qz = x[i] * scale[0] + shift[0], y[i] * scale[1] + shift[1], z[i] * scale[2] + shift[2]
-        value = gradient_at(qx, qy, qz, period, inverse, number) * min(max(seen - level[i], none), one)
-        shown = min(max(wide - level[i], none), one)
+        shown = min(max(most - (footprint[i] * scarce) ** 2, none), one)
+        value = gradient_at(qx, qy, qz, period, inverse, number) * shown
         value += tails * value * abs(value) + skew * (value * value - shown * shown)
         total[i] += strength * value * (envelope[i] if varied else one)
 

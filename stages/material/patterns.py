@@ -5,6 +5,7 @@ are averaged over it, and what faded from below a threshold is put back as a sof
 Where the place repeats, lengths are rounded so that a whole number of them fits its period. """
 
 import math
+from dataclasses import replace
 from functools import cache
 from statistics import NormalDist
 from typing import Any, NamedTuple
@@ -12,8 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.material import heap_kernels as heaps
 from stages.material import noise_kernels as kernels
 from stages.material import scatter_kernels as scattered
+from stages.material.heap_kernels import Pieces
 from stages.material.noise_kernels import Octave, Period, Shape
 from stages.material.place import Axes, Place
 from stages.material.scatter_kernels import Strokes
@@ -59,9 +62,22 @@ def seed_of(at: Place, number: int) -> np.uint32:
     return np.uint32((at.seed * 0x9E3779B1 + number * 0x85EBCA77 + 0x165667B1) & 0xFFFFFFFF)
 
 
-def fading(wavelength: float, footprint: Array) -> Array:
-    """How much of an octave is left at a footprint: all at half its wavelength, nothing at the whole of it."""
-    return np.clip(np.log2(np.float32(wavelength) / footprint), 0, 1)
+WIDEST = 1.65
+"""Footprint, in sizes of a structure, over which nothing is left of it: lattice noise varies over almost two of its cells."""
+
+
+def fading(size: float, footprint: Array) -> Array:
+    """How much of a structure of a size is left at a footprint: 0.92 at half of it, 0.64 at the whole, nothing from `WIDEST`
+    on.
+
+    A parabola near to what makes 2 x 2 samples most alike the mean over their area, measured on gradient noise (0.93, 0.68,
+    0.23 at 1.65): what fades earlier or later looks another way in a texture of another size."""
+    return np.clip(np.float32(1.01) - np.square(footprint * np.float32(1 / (WIDEST * size))), 0, 1)
+
+
+def legible(size: float, stretch: Axes) -> float:
+    """The size that counts for `fading`: the shortest; lines, which a footprint averages one way alone, last longer."""
+    return min(stretch) * size * (1.35 if max(stretch) > 4 * min(stretch) else 1.0)
 
 
 def _lattice(at: Place, wavelength: float, stretch: Axes) -> tuple[Axes, Period]:
@@ -76,14 +92,14 @@ def _octave(at: Place, size: float, seed: int, stretch: Axes, strength: float = 
     """An octave of a wavelength along the axes that are not stretched."""
     number = seed_of(at, seed)
     x, y, z = (float(number >> s & 255) / 256 + 0.37 for s in (0, 8, 16))
-    seen = math.log2(size * min(stretch))
-    return Octave(*_lattice(at, size, stretch), (x, y, z), number, seen, math.log2(size), strength)
+    return Octave(*_lattice(at, size, stretch), (x, y, z), number, WIDEST * legible(size, stretch), strength)
 
 
 def noise(at: Place, size: float, seed: int = 0, stretch: Axes = SQUARE) -> Array:
     """One octave of gradient noise, mean 0, deviation 1 where the footprint lets it be seen. Returns: (P,)."""
     total, octave = np.zeros(len(at), np.float32), _octave(at, size, seed, stretch)
-    kernels.add_octave(at.p[0], at.p[1], at.p[2], octave, np.log2(at.footprint), NONE, Shape(0.0, 0.0), total)
+    x, y, z = at.straight(size)
+    kernels.add_octave(x, y, z, octave, at.footprint, NONE, Shape(0.0, 0.0), total)
     return total
 
 
@@ -92,16 +108,16 @@ def fbm(at: Place, spectrum: Spectrum, seed: int = 0) -> Array:
     t, s = spectrum.tails, spectrum.skew
     spread = math.sqrt(1 + 2 * t * 1.596 + 3 * t * t + 2 * s * s)
     thinnest = float(at.footprint.min()) if len(at) else 1.0
-    total, level = np.zeros(len(at), np.float32), np.log2(at.footprint)
-    envelope = NONE
+    total, envelope = np.zeros(len(at), np.float32), NONE
     if spectrum.patch:
         envelope = np.exp(np.float32(spectrum.patch) * noise(at, 3 * spectrum.size, seed + 977, spectrum.stretch))
     for k, strength in enumerate(spectrum.strengths()):
         size = spectrum.size / 2**k
-        if size * min(spectrum.stretch) <= thinnest:
+        if 1.01 * WIDEST * legible(size, spectrum.stretch) <= thinnest:
             break
         octave = _octave(at, size, seed * 31 + k, spectrum.stretch, strength / spread)
-        kernels.add_octave(at.p[0], at.p[1], at.p[2], octave, level, envelope if k else NONE, Shape(t, s), total)
+        x, y, z = at.straight(size)
+        kernels.add_octave(x, y, z, octave, at.footprint, envelope if k else NONE, Shape(t, s), total)
     return total
 
 
@@ -109,7 +125,7 @@ def lost(at: Place, spectrum: Spectrum) -> Array:
     """Deviation of what the footprint hides of `fbm`'s noise. Returns: (P,)."""
     variance = np.zeros(len(at), np.float32)
     for k, strength in enumerate(spectrum.strengths()):
-        seen = fading(spectrum.size / 2**k * min(spectrum.stretch), at.footprint)
+        seen = fading(legible(spectrum.size / 2**k, spectrum.stretch), at.footprint)
         variance += np.float32(strength**2) * (1 - seen * seen)
     return np.sqrt(variance)
 
@@ -148,8 +164,12 @@ def line(distance: Array, half_width: Array | float, footprint: Array) -> Array:
 def warped(at: Place, amount: float, size: float, seed: int = 0, octaves: int = 2) -> Place:
     """The place with its points displaced by noise. amount: deviation, metres. size: wavelength of the displacement."""
     spectrum = Spectrum(size, size / 2 ** (octaves - 1), 0.5)
-    offset = np.stack([fbm(at, spectrum, seed * 3 + axis) for axis in range(3)])
-    return at.moved(np.float32(amount) * offset)
+    axes = 2 if at.level else 3  # what lies along the surface stays on it
+    offset = np.zeros((3, len(at)), np.float32)
+    for axis in range(axes):
+        offset[axis] = np.float32(amount) * fbm(at, spectrum, seed * 3 + axis)
+    bend = offset if at.bend is None else offset + at.bend
+    return replace(at, p=at.p + offset, bend=bend, reach=max(size, at.reach))
 
 
 class Cells(NamedTuple):
@@ -250,6 +270,65 @@ def marks(
     return Marks(cover.astype(np.float32), across.astype(np.float32), along, ident)
 
 
+class Blades(NamedTuple):
+    """Blades of grass and the like. cover: (P,) share of the footprint. side: (P,) −1 … 1 over the blade, wide or narrow.
+    along: (P,) −1 at the root … 1 at the tip. shadow: (P,) that a blade throws beside itself, 0 … 1. ident: (P,) uint32."""
+
+    cover: Array
+    side: Array
+    along: Array
+    shadow: Array
+    ident: NDArray[np.uint32]
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each blade, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+def blades(
+    at: Place, length: float, width: float, count: int, angle: float = 0.0, spread: float = 6.28, seed: int = 0,
+    vary: float = 0.5, bend: float = 0.2,
+) -> Blades:  # fmt: skip
+    """`marks` that are broad near their root and run out into a point, with the shadow that they throw on what lies below."""
+    found = _bladed(at, length, width, count, angle, spread, seed, vary, bend)
+    shown = fading(0.8 * width, at.footprint)
+    if len(at) and shown.min() < 1:
+        cover, shadow = _mean_blades(length, width, count, vary, bend)
+        found = found._replace(cover=mix_to(cover, found.cover, shown), shadow=mix_to(shadow, found.shadow, shown))
+    return found
+
+
+def mix_to(mean: float, value: Array, shown: Array) -> Array:
+    """A value, or its mean where the footprint hides single ones."""
+    return (mean + (value - np.float32(mean)) * shown).astype(np.float32)
+
+
+AROUND_BLADE = 2.2
+"""Width of the stroke that holds a blade and its shadow, in widths of the blade."""
+
+
+def _bladed(at: Place, length: float, width: float, count: int, angle: float, spread: float, seed: int, vary: float,
+            bend: float) -> Blades:  # fmt: skip
+    """`blades` as if single ones could always be seen."""
+    stroke = marks(at, length, AROUND_BLADE * width, count, angle, spread, seed, vary, bend)
+    here, t = abs(stroke.across) < 2, np.clip(0.5 + 0.5 * stroke.along, 0, 1)
+    half = np.float32(1.5) * np.sqrt(np.sqrt(t + np.float32(0.06))) * (1 - t) ** np.float32(0.7)  # of the blade's half width
+    away = np.float32(AROUND_BLADE) * abs(stroke.across)
+    cover = here * edge((half - away) * np.float32(width / 2), at.footprint)
+    shadow = here * np.exp(-np.maximum(away - half, 0) / np.float32(0.5)) * np.clip(2.0 - away, 0, 1)
+    side = np.clip(np.where(here, np.float32(AROUND_BLADE) * stroke.across / np.maximum(half, 0.05), 0), -1, 1)
+    return Blades(cover.astype(np.float32), side, np.where(here, stroke.along, 0), shadow.astype(np.float32), stroke.ident)
+
+
+@cache
+def _mean_blades(length: float, width: float, count: int, vary: float, bend: float) -> tuple[float, float]:
+    """Mean cover and shadow of `blades`, over 20,000 points."""
+    p = np.random.default_rng(0).uniform(0, 40 * length, (3, 20_000)).astype(np.float32)
+    probe = Place(p, p[:2], np.zeros(p.shape[1], np.int32), np.full(p.shape[1], 0.01 * width, np.float32))
+    found = _bladed(probe, length, width, count, 0.0, 6.28, 0, vary, bend)
+    return float(found.cover.mean()), float(found.shadow.mean())
+
+
 class Tiles(NamedTuple):
     """Tiles of a bond. ident: (P,) uint32. x, y: (P,) from the tile's middle, metres. width, height: of a tile, metres.
     border: (P,) distance to the tile's rim, metres, positive inside. turned: (P,) whether the tile stands across. """
@@ -344,7 +423,7 @@ def weave(at: Place, pitch: float, draft: str = "plain", fill: float = 0.92, see
     shown_warp = np.where(on, warp_on_top, ~warp_on_top)
     i, j = (k - c * np.floor(k / c) if c else k for k, c in ((i, columns), (j, rows)))
     thread = np.where(shown_warp, i, j + 4_000_037)
-    seen = np.clip(np.log2(np.float32(pitch) / at.footprint) - 0.5, 0, 1)
+    seen = fading(0.55 * pitch, at.footprint)
     across_it = np.where(on, over, other)
     return Weave(
         height.astype(np.float32), shown_warp.astype(np.float32), across_it.astype(np.float32), gap,
@@ -449,6 +528,72 @@ def _mean_piece(gap: float, corner: float, jitter: float, depth: float) -> tuple
     return float((inside > 0).mean()), float(dome.mean())
 
 
+class Heap(NamedTuple):
+    """Pieces that lie on and between one another. cover: (P,) share of the footprint that they hide of the ground. height: (P,)
+    of what lies on top, metres. nook: (P,) 0 on open faces … 1 where two pieces meet, deep down. lean: (P,) a number of the
+    broken face, −0.5 … 0.5. ident: (P,) uint32 of the piece. shown: (P,) how much of single
+    pieces the footprint shows. size: metres. """
+
+    cover: Array
+    height: Array
+    nook: Array
+    lean: Array
+    ident: NDArray[np.uint32]
+    shown: Array
+    size: float
+
+    def random(self, number: int) -> Array:
+        """A number in [0, 1) for each piece, another one for each `number`."""
+        return kernels.random_numbers(self.ident, number)
+
+
+STONES = Pieces(0.92, 0.5, 0.75, 0.3, 1.6, 0.45, 0.6, 0.5)
+"""Crushed: flat faces, all sizes."""
+
+PEBBLES = Pieces(0.85, 0.35, 0.3, 1.0, 1.0, 0.55, 0.5, 0.1)
+"""Washed: domes."""
+
+
+def heap(at: Place, size: float, shape: Pieces = STONES, seed: int = 0, stretch: Axes = SQUARE) -> Heap:
+    """Pieces heaped up, the upper hiding the lower, wedged into one another. size: distance between them, metres. The gaps
+    between them are what their shapes leave, so no two are alike."""
+    top, second, ident, facet = _heaped(at, size, shape, seed, stretch)
+    cover, height, nook = _rises(top, second, shape)
+    shown = fading(0.7 * size * min(stretch), at.footprint)
+    if len(at) and shown.min() < 1:
+        means = _mean_heap(shape)
+        cover, height, nook = (m + (v - m) * shown for v, m in zip((cover, height, nook), means, strict=True))
+    lean = (kernels.random_numbers(facet, 1) - np.float32(0.5)) * shown * (ident > 0)
+    return Heap(cover, height * np.float32(size), nook, lean, ident, shown, size)
+
+
+def _heaped(at: Place, size: float, shape: Pieces, seed: int, stretch: Axes) -> tuple[Array, ...]:
+    """Heights of the two uppermost pieces, in cells, and hashes of the uppermost and of its face."""
+    scale, period = _lattice(at, size, stretch)
+    x, y, z = (np.ascontiguousarray(axis * np.float32(s)) for axis, s in zip(at.p, scale, strict=True))
+    top, second = np.empty(len(at), np.float32), np.empty(len(at), np.float32)
+    ident, facet = np.empty(len(at), np.uint32), np.empty(len(at), np.uint32)
+    heaps.heap(x, y, z, period, shape, seed_of(at, seed), top, second, ident, facet)
+    return top, second, ident, facet
+
+
+def _rises(top: Array, second: Array, shape: Pieces) -> tuple[Array, Array, Array]:
+    """Cover, height and nook of a heap, in cells."""
+    high = np.float32(shape.thick + 0.5 * shape.lift)
+    apart = np.exp((second - top) * np.float32(9))
+    deep = np.clip(1 - top / high, 0, 1)
+    return (top > 0).astype(np.float32), top, np.clip(0.75 * deep + 0.5 * apart * (0.3 + deep), 0, 1)
+
+
+@cache
+def _mean_heap(shape: Pieces) -> tuple[float, ...]:
+    """Means of `_rises` over 20,000 points."""
+    p = np.random.default_rng(0).uniform(0, 100, (3, 20_000)).astype(np.float32)
+    probe = Place(p, p[:2], np.zeros(p.shape[1], np.int32), np.full(p.shape[1], 1e-3, np.float32))
+    top, second, _, _ = _heaped(probe, 1.0, shape, 0, SQUARE)
+    return tuple(float(v.mean()) for v in _rises(top, second, shape))
+
+
 class Ripples(NamedTuple):
     """crest: (P,) −1 in the troughs … 1 on the crests, mean 0. along: (P,) 0 … 1 from one steep side to the next.
     shown: (P,) how much of them the footprint shows.
@@ -469,7 +614,7 @@ def ripples(at: Place, length: float, wander: float, seed: int = 0) -> Ripples:
     turns = at.p[1] / np.float32(fitted) + np.arctan2(real, imaginary) / np.float32(2 * math.pi)  # a fork where both are 0
     along = turns - np.floor(turns)
     strength = np.clip(np.hypot(real, imaginary) / 0.6, 0, 1)
-    shown = fading(length, at.footprint)
+    shown = fading(0.55 * length, at.footprint)
     steep = np.float32(0.7)
     crest = np.where(along < steep, -np.cos(math.pi * along / steep), np.cos(math.pi * (along - steep) / (1 - steep)))
     return Ripples((crest * strength * shown).astype(np.float32), along.astype(np.float32), shown)

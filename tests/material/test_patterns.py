@@ -1,6 +1,7 @@
 """Noise, cells, strokes, tiles and threads: their scale, their spectrum, their period, and what a footprint leaves of them."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,8 +17,8 @@ def test_noise_is_what_a_plain_reading_of_perlin_says() -> None:
     """The compiled loop against one point after the other, corner by corner."""
     rng = np.random.default_rng(0)
     x, y, z = rng.uniform(-20, 20, (3, 200)).astype(np.float32)
-    found, fine, even = np.zeros(200, np.float32), np.full(200, -20, np.float32), np.empty(0, np.float32)
-    octave = Octave((1.0, 1.0, 1.0), Period(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.uint32(5), 0.0, 0.0, 1.0)
+    found, fine, even = np.zeros(200, np.float32), np.full(200, 1e-6, np.float32), np.empty(0, np.float32)
+    octave = Octave((1.0, 1.0, 1.0), Period(0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.uint32(5), 1.0, 1.0)
     add_octave(x, y, z, octave, fine, even, Shape(0.0, 0.0), found)
 
     def plain(p: np.ndarray) -> float:
@@ -174,6 +175,36 @@ def test_a_weave_goes_over_and_under() -> None:
     found = weave(square(0.12, 240, 1e-5), 0.01, "plain")
     warp = found.warp.reshape(240, 240)[10::20, 10::20]
     assert (warp[::2, ::2] == warp[0, 0]).all() and (warp[1::2, ::2] == 1 - warp[0, 0]).all()
+
+
+def test_what_is_finer_than_a_displacement_is_not_drawn_out_by_it() -> None:
+    """Else it would follow the displacement's contour lines: along them it would vary little, across them much."""
+    at = square(0.2, 200, 1e-4)
+    bent = patterns.warped(at, 0.008, 0.03, 1, 4)
+    fine, along = noise(bent, 0.0015), np.abs(bent.bend).max()
+    assert along > 0.01 and np.corrcoef(fine, noise(at, 0.0015))[0, 1] > 0.3  # displaced by a third of its size
+    steps = [np.abs(np.diff(fine.reshape(200, 200), axis=axis)).mean() for axis in (0, 1)]
+    still = [np.abs(np.diff(noise(at, 0.0015).reshape(200, 200), axis=axis)).mean() for axis in (0, 1)]
+    np.testing.assert_allclose(steps, still, rtol=0.3)
+    np.testing.assert_array_equal(noise(bent, 0.05), noise(replace(bent, bend=None), 0.05))  # what is wider follows wholly
+    assert not patterns.warped(at.flat, 0.008, 0.03, 1).bend[2].any()  # a surface's two axes stay on it
+
+
+def test_fading_is_what_makes_samples_most_like_the_mean_over_their_area() -> None:
+    """Of the mean of 2 x 2 samples that stand for a square, beside that of 16 x 16."""
+    corner = np.random.default_rng(0).uniform(0, 300, (2, 4000))
+    for share in (0.3, 0.6, 1.0, 1.3):
+
+        def mean(count: int, footprint: float = share) -> np.ndarray:
+            step = (np.arange(count) + 0.5) / count * 2 * footprint
+            u, v = (np.add.outer(axis, steps.ravel()) for axis, steps in zip(corner, np.meshgrid(step, step), strict=True))
+            p = np.stack([u.ravel(), v.ravel(), 0 * u.ravel()]).astype(np.float32)
+            at = Place(p, p[:2], np.zeros(p.shape[1], np.int32), np.full(p.shape[1], 1e-6, np.float32))
+            return noise(at, 1.0).reshape(len(corner.T), -1).mean(1)
+
+        samples, truth = mean(2), mean(16)
+        best = (samples @ truth) / (samples @ samples)
+        assert patterns.fading(1.0, np.float32(share)) == pytest.approx(best, abs=0.1)
 
 
 def test_seeds_draw_other_patterns_of_the_same_kind() -> None:

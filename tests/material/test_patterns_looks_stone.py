@@ -3,9 +3,26 @@
 import numpy as np
 import pytest
 
+from stages.material.heap_kernels import FACETS, bedding, plane, rise
 from stages.material.look import averaged, each, palette
-from stages.material.patterns import Spectrum, cracks, fbm, lost, marks, masked, pebbles, ripples, spots
+from stages.material.noise_kernels import mixed
+from stages.material.patterns import (
+    PEBBLES,
+    STONES,
+    Spectrum,
+    cracks,
+    fbm,
+    heap,
+    lost,
+    marks,
+    masked,
+    pebbles,
+    ripples,
+    seed_of,
+    spots,
+)
 from stages.material.place import Place
+from stages.material.scatter_kernels import point_in
 
 POINTS = 60_000
 
@@ -23,6 +40,9 @@ COVERS = {
     "pebbles": lambda at: pebbles(at, 0.02, 0.002, 0.6, 3).cover,
     "pebbles in a face": lambda at: pebbles(at, 0.02, 0.002, 0.6, 3, depth=0.0).cover,
     "backs of pebbles": lambda at: pebbles(at, 0.02, 0.002, 0.6, 3).dome,
+    "heap": lambda at: heap(at, 0.02, STONES, 3).cover,
+    "height of a heap": lambda at: 50 * heap(at, 0.02, PEBBLES, 3).height,
+    "nooks of a heap": lambda at: heap(at, 0.02, STONES, 3).nook,
     "spots": lambda at: spots(at, 0.01, (0.0005, 0.004), 0.85, 3).cover,
     "masked": lambda at: masked(at, Spectrum(0.05, 0.0005, 0.9), 0.1, 3),
     "masked, soft": lambda at: masked(at, Spectrum(0.05, 0.0005, 0.9), 0.2, 3, 0.5),
@@ -55,6 +75,30 @@ def test_pebbles_leave_their_gap():
     assert apart.cover.mean() < 0.8 * packed.cover.mean()
     assert apart.inside.max() < 0.02
     assert (apart.dome[apart.inside <= 0] == 0).all()
+
+
+def test_a_heap_shows_what_lies_on_top():
+    """The compiled loop, which draws what is around a cell once, against all pieces around one point after the other."""
+    at = place(1e-4)[:60]
+    found, number, one = heap(at, 0.02, STONES, 3), seed_of(at, 3), np.float32(1)
+    for k in range(len(at)):
+        p = at.p[:, k] * np.float32(50)
+        cell, seen = np.floor(p), [(0.0, 0)]
+        with np.errstate(over="ignore"):
+            for near in range(27):
+                *middle, h = point_in.py_func(near, *cell, (np.float32(0),) * 3, (np.float32(0),) * 3, one, number)
+                away = p - cell - np.array(middle)
+                radius = np.float32(STONES.radius * (1 - STONES.vary * (int(h) & 0xFFFF) / 65536))
+                turned = mixed.py_func(np.uint32(h ^ np.uint32(0x5BD1E995)))
+                faces = [plane.py_func(turned, j, radius, np.float32(STONES.sharp)) for j in range(FACETS)]
+                inside = min(radius - np.linalg.norm(away), *(face[3] - away @ np.array(face[:3]) for face in faces))
+                level, *lean = bedding.py_func(turned, STONES)
+                if inside > 0:
+                    height = level + rise.py_func(inside, STONES)[0] + away[:2] @ np.array(lean)
+                    seen.append((max(float(height), 0.001), int(h)))
+        seen.sort()
+        assert found.height[k] == pytest.approx(0.02 * seen[-1][0], abs=5e-5)
+        assert found.ident[k] == seen[-1][1] or seen[-1][0] - seen[-2][0] < 1e-3
 
 
 def test_ripples_are_as_long_as_asked_and_tile():

@@ -4,13 +4,16 @@ import numpy as np
 
 from stages.material.look import Look, averaged, each, mix, palette, shade, tint
 from stages.material.patterns import (
+    STONES,
     Array,
     Spectrum,
+    blades,
     cells,
     cracks,
     edge,
     fading,
     fbm,
+    heap,
     marks,
     masked,
     noise,
@@ -113,26 +116,25 @@ def cracked_mud(at: Place) -> Look:
 
 
 def grass(at: Place) -> Look:
-    """A lawn from above: blades lean over one another, bright along the upper ones, straw and shade beneath."""
+    """A lawn from above: pointed blades folded along their rib, one half in the light, straw among them, shade beneath."""
     flat = at.flat
     patch = fbm(flat, Spectrum(0.5, 0.02, 0.8), 1)
     grit = fbm(flat, Spectrum(0.004, 0.0005, 1.0, tails=0.4, patch=0.4), 2)
-    color = palette(0.45 + 0.2 * grit, "#2b3318", "#38431f", "#4c4b28")
-    height = -0.012 + 1e-3 * grit
-    layers = ((0.055, 0.0048, 7, "#2f431b"), (0.052, 0.0046, 7, "#3f5c24"), (0.048, 0.0042, 7, "#54782f"))
+    color, height = palette(0.45 + 0.2 * grit, "#262d15", "#35401c", "#4c4728"), -0.012 + 1e-3 * grit
+    seen = fading(0.004, at.footprint)
+    layers = ((0.052, 0.0060, 9, "#2c411a"), (0.048, 0.0054, 8, "#3a5722"), (0.044, 0.0044, 8, "#4c702b"))
     for k, (length, width, count, deep) in enumerate(layers):
-        blade = marks(at, length, width, count, 1.2 + 0.7 * k, 5.0, 3 + k, 0.5, 0.22)
-        dry = blade.random(1) < 0.10
-        tone = palette(
-            0.45 + 0.15 * patch + 0.75 * (blade.random(2) - 0.5) + 0.1 * blade.along, deep, "#5d8233", "#7fa345", "#a3bd62"
-        )
-        tone = np.where(dry, palette(blade.random(3), "#8d7a45", "#b5a067", "#cdbb86"), tone)
-        fold = np.where(abs(blade.across) < 2, np.abs(blade.across + 0.15), 0)
-        tone = shade(tone, 0.2 * blade.along - 0.32 * fold + 0.16 * (k - 1.5))
-        color = mix(color, tone, blade.cover)
-        height = mix(height, -0.004 + 0.006 * k + 0.006 * blade.along - 0.0008 * fold, blade.cover)
-    color = tint(shade(color, 0.05 * grit), 0.06 * noise(flat, 0.08, 9))
-    return Look(color, np.clip(0.62 + 0.06 * grit - 0.04 * patch, 0, 1), 0.0, height)
+        blade = blades(at, length, width, count, 1.2 + 0.7 * k, 5.0, 3 + k, 0.55, 0.3)
+        tone = palette(0.4 + 0.12 * patch + 0.6 * (blade.random(2) - 0.5) * seen, deep, "#587d31", "#7a9f44", "#9fba62")
+        straw = palette(blade.random(3), "#8d7a45", "#b5a067", "#cdbb86")
+        tone = mix(tone, straw, (blade.random(1) < 0.09) * seen + 0.09 * (1 - seen))
+        fold = np.tanh(6 * blade.side * (blade.random(4) - 0.5))  # the half that turns to the light
+        rib = np.exp(-np.square(blade.side / 0.16))
+        tone = shade(tone, (0.24 * fold + 0.14 * rib + 0.25 * blade.along - 0.22) * seen + 0.07 + 0.10 * k + 0.05 * grit)
+        color = mix(shade(color, -0.55 * blade.shadow), tone, blade.cover)
+        rise = -0.004 + 0.005 * k + (0.005 * blade.along + 0.0005 * (abs(blade.side) - rib)) * seen
+        height = mix(height, rise, blade.cover)
+    return Look(tint(color, 0.06 * noise(flat, 0.08, 9)), np.clip(0.62 + 0.06 * grit - 0.04 * patch, 0, 1), 0.0, height)
 
 
 def moss(at: Place) -> Look:
@@ -304,35 +306,24 @@ def charcoal(at: Place) -> Look:
     )
 
 
+LUMPS = STONES._replace(radius=0.95, vary=0.4, sharp=0.7, rounding=0.0, slope=1.2, thick=0.6, tilt=0.8)
+"""Coal breaks flat, along its beds and across them."""
+
+
 def coal(at: Place) -> Look:
-    """Broken bituminous coal: black lumps with flat faces, bright and dull bands, conchoidal glints, dust between."""
-    grit = fbm(at, Spectrum(0.004, 0.0004, 1.05, tails=0.5, skew=0.2, patch=0.5), 1)
-    color, rough, height = palette(0.5 + 0.2 * grit, "#262627", "#303031"), 0.9 + 0.03 * grit, 2e-4 * grit
-    for k, (size, share) in enumerate(((0.012, 0.9), (0.026, 0.75), (0.055, 0.6))):
-        lump = pebbles(warped(at, 0.02 * size, 0.5 * size, 2 + k), size, 0.04 * size, 0.1, 5 + k, 1.0)
-        face = cells(warped(at, 0.03 * size, 0.5 * size, 8 + k), 0.45 * size, 11 + k)  # each lump is broken into faces
-        seen = fading(0.4 * size, at.footprint)
-        here = lump.cover * ((lump.cells.random(1) < share) * lump.shown + share * (1 - lump.shown))
-        lean = sum(
-            face.offset[a] * (face.random(2 + a) - 0.5) + 0.5 * lump.cells.offset[a] * (lump.cells.random(2 + a) - 0.5)
-            for a in (0, 1)
-        )
-        band = np.clip(
-            fbm(
-                at.moved(np.stack([0 * grit, 0.3 * lean, 9 * lump.cells.random(5)])), Spectrum(0.01, 0.001, 0.8, (5, 1, 5)), 14
-            ),
-            -1,
-            1,
-        )
-        bright = np.clip(0.3 + 0.9 * (face.random(6) ** 2 - 0.33) * seen + 0.2 * band, 0, 1)
-        tone = shade(
-            averaged(bright, 0.27 * (1 - seen), "#272728", "#2e2e30", "#3c3d40", "#56575b", "#7a7b80"),
-            0.12 * grit + 0.9 * (np.minimum(lump.dome, 0.6) - 0.55) + 6 * lean / size * 0.12 * seen,
-        )
-        color = mix(color, tone, here)
-        rough = mix(rough, 0.55 - 0.34 * bright + 0.05 * grit, here)
-        height = mix(height, size * (0.3 * lump.dome + 0.1 * lump.cells.random(7)) + 0.7 * lean, here)
-    return Look(color, np.clip(rough, 0.08, 1), 0.0, height - 0.012)
+    """Broken bituminous coal: black lumps of all sizes with flat faces, dull ones and bright ones, slack and dust between."""
+    grit = fbm(at, Spectrum(0.005, 0.0003, 1.05, tails=0.5, skew=0.2, patch=0.5), 1)
+    color, rough, height = palette(0.5 + 0.2 * grit, "#222223", "#353434", "#4a4947"), 0.92 + 0.03 * grit, 3e-4 * grit
+    dust = masked(at, Spectrum(0.06, 0.0008, 0.9, patch=0.5), 0.25, 3, 0.5)
+    for k, shape in enumerate((LUMPS, LUMPS._replace(radius=0.8))):
+        lump = heap(at, (0.011, 0.036)[k], shape, 4 + k)
+        bright = 0.3 + 0.75 * lump.lean + 0.35 * (lump.random(1) - 0.5) * lump.shown + 0.06 * grit
+        tone = averaged(bright, 0.27 * (1 - lump.shown), "#242425", "#2b2c2d", "#3a3b3d", "#65666a", "#a3a4a8")
+        tone = shade(tone, 0.16 * grit - 1.3 * (lump.nook - 0.2))
+        tone = mix(tone, palette(0.5 + 0.2 * grit, "#474542", "#5d5a56"), 0.4 * dust * np.clip(1 - bright, 0, 1))
+        color, rough = mix(color, tone, lump.cover), mix(rough, 0.7 - 0.5 * bright + 0.05 * grit + 0.15 * dust, lump.cover)
+        height = mix(height, 0.8 * lump.height + 0.002 * k + 1e-4 * grit, lump.cover)
+    return Look(color, np.clip(rough, 0.12, 1), 0.0, height - 0.012)
 
 
 def salt(at: Place) -> Look:

@@ -124,7 +124,7 @@ def machined(at: Place, kind: Metal) -> Look:
     pitch = 0.0012 if not at.period[1] else at.period[1] / max(1, round(at.period[1] / 0.0012))
     bend = 0.06 * (u - np.float32(at.period[0] / 2)) ** 2 if not at.period[0] else 0 * u
     phase = (v + bend) / np.float32(pitch)
-    groove = 0.5 + (abs(phase - np.floor(phase) - 0.5) * 2 - 0.5) * fading(pitch, at.footprint)
+    groove = 0.5 + (abs(phase - np.floor(phase) - 0.5) * 2 - 0.5) * fading(0.55 * pitch, at.footprint)
     each = fbm(at.flat, Spectrum(0.003, 0.0004, 1.0, (60, 1, 1), tails=0.3), 1)
     fine = 1.1 * (groove - 0.5) + 0.7 * each
     look = worked(at, kind, 0.3, 6e-6 * fine, fine)

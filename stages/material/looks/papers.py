@@ -125,7 +125,7 @@ def cardboard(at: Place) -> Look:
     """Brown liner board: long fibres and dark specks of old print, flutes that show faintly through, scuffs."""
     color, fine, fibre = sheet(at, KRAFT, ("#8a6439", "#d0ad80", "#7a5932", "#c49b68"), 0.55)
     flute, _, _ = repeats(at, 0.0075, 0)
-    wave = np.cos(np.pi * flute) * fading(0.0075, at.footprint)
+    wave = np.cos(np.pi * flute) * fading(0.55 * 0.0075, at.footprint)
     speck = spots(at, 0.006, (0.0001, 0.00045), 0.4, 11).cover
     scuff = masked(warped(at.flat, 0.003, 0.02, 12, 3), Spectrum(0.05, 0.0006, 0.9, patch=0.6), 0.07, 13, 0.4)
     wide = fbm(at.flat, Spectrum(0.2, 0.004, 0.8, (1, 2, 1)), 14)

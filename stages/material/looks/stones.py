@@ -6,7 +6,8 @@ import numpy as np
 
 from stages.material.look import Look, averaged, each, mix, palette, shade, tint
 from stages.material.patterns import (
-    Array,
+    PEBBLES,
+    STONES,
     Spectrum,
     cells,
     cracks,
@@ -14,6 +15,7 @@ from stages.material.patterns import (
     exceeds,
     fading,
     fbm,
+    heap,
     lost,
     masked,
     noise,
@@ -346,51 +348,39 @@ def cobblestone(at: Place) -> Look:
 
 
 def pebble_bed(at: Place) -> Look:
-    """Beach pebbles, washed smooth, in two sizes: grey, rust, white and speckled, some with a band."""
-    bent = warped(at, 0.0008, 0.02, 1)
-    small, large = pebbles(bent, 0.016, 0.001, 0.9, 2, 1.0, (1.2, 1, 1)), pebbles(bent, 0.036, 0.004, 0.85, 3, 1.0, (1, 1.2, 1))
-    on_top = (large.cells.random(1) < 0.6) & (large.inside > -0.002)
-
-    def pick(above: Array | float, below: Array | float) -> Array:
-        return np.where(on_top, above, below).astype(np.float32)
-
-    bed = [pick(large.cells.random(k), small.cells.random(k)) for k in range(2, 7)]
-    dome, cover, shown = pick(large.dome, small.dome), pick(large.cover, small.cover), fading(0.012, at.footprint)
-    speckle = fbm(at, Spectrum(0.004, 0.0004, 1.0, tails=0.5, skew=0.2, patch=0.5), 4)
-    band = abs(noise(bent, 0.03, 5, (1, 0.4, 1)) - 3 * (bed[3] - 0.5)) < 0.14
-    color = each(bed[0], shown, "#55585b", "#7d7f7f", "#a39f97", "#8b6f58", "#c2b59f", "#6f6a64", "#ddd8cd", "#93705a")
-    color = mix(color, palette(bed[1], "#cfc9bd", "#ece8df"), 0.6 * band * (bed[2] < 0.25) * shown)
-    color = tint(
-        shade(color, 0.10 * speckle * (0.4 + 1.2 * bed[4]) + 0.3 * (bed[1] - 0.5) * shown + 0.35 * dome - 0.3),
-        0.1 * (bed[2] - 0.5),
-    )
-    color = mix(palette(0.5 + 0.2 * speckle, "#37322c", "#4d463d"), color, cover)
-    height = cover * dome * pick(0.012, 0.006) + pick(0.003, 0.0) - 0.007 + 3e-5 * speckle
-    return Look(color, np.clip(0.6 + 0.04 * speckle - 0.1 * (dome - 0.7) + 0.3 * (1 - cover), 0, 1), 0.0, height)
+    """Beach pebbles, washed smooth, the large among the small: grey, rust, white and speckled, some with a band."""
+    grit = fbm(at, Spectrum(0.004, 0.0004, 1.0, tails=0.5, skew=0.2, patch=0.5), 4)
+    color, height = shade(palette(0.5 + 0.2 * grit, "#3a342d", "#574f45"), 0.1 * grit), 1e-4 * grit
+    for k, shape in enumerate((PEBBLES, PEBBLES._replace(radius=0.7))):
+        bed = heap(at, (0.013, 0.030)[k], shape, 2 + k, (1.25, 1, 1))
+        rock = each(
+            bed.random(1), bed.shown, "#55585b", "#7d7f7f", "#a39f97", "#8b6f58", "#c2b59f", "#6f6a64", "#ddd8cd", "#93705a"
+        )
+        speckle = 0.16 * grit * bed.random(2)
+        band = abs(noise(at, 0.03, 5, (1, 0.4, 1)) - 3 * (bed.random(3) - 0.5)) < 0.14
+        rock = mix(rock, palette(bed.random(4), "#cfc9bd", "#ece8df"), 0.6 * band * (bed.random(5) < 0.25) * bed.shown)
+        rock = shade(rock, speckle + 0.3 * (bed.random(6) - 0.5) * bed.shown - 1.3 * (bed.nook - 0.15))
+        color = mix(color, tint(rock, 0.1 * (bed.random(7) - 0.5) * bed.shown), bed.cover)
+        height = mix(height, 0.6 * bed.height + 0.002 * k + 3e-5 * grit, bed.cover)
+    return Look(color, np.clip(0.6 + 0.04 * grit, 0, 1), 0.0, height - 0.007)
 
 
 def gravel(at: Place) -> Look:
-    """Crushed stone: sharp pieces of all sizes, dust between them."""
-    grit = fbm(at, Spectrum(0.003, 0.0004, 1.0, tails=0.4, patch=0.4), 1)
+    """Crushed stone: sharp pieces of all sizes, wedged into one another, dust on them and between."""
+    grit = fbm(at, Spectrum(0.004, 0.0004, 1.0, tails=0.4, patch=0.4), 1)
     dust = fbm(at, Spectrum(0.2, 0.01, 0.8), 2)
-    color, height = shade(palette(0.5 + 0.2 * dust, "#45413b", "#57534c", "#6b665e"), 0.14 * grit), 2e-4 * grit
-    for k, (size, share) in enumerate(((0.006, 0.9), (0.012, 0.7), (0.022, 0.5))):
-        piece = pebbles(warped(at, 0.03 * size, 0.5 * size, 3 + k), size, 0.05 * size, 0.15, 6 + k, 1.0)
-        bed = piece.cells
-        here = piece.cover * (bed.random(1) < share) * piece.shown + 0.6 * share * (1 - piece.shown)
-        tilt = (
-            (bed.offset[0] * (bed.random(2) - 0.5) + bed.offset[1] * (bed.random(3) - 0.5)) / size * piece.shown
-        )  # a broken face, tilted
-        stone = each(bed.random(4), piece.shown, "#6c6a68", "#8a8782", "#a5a19a", "#7a7169", "#bdb8af", "#918b84")
-        stone = shade(
-            stone,
-            0.5 * tilt + 0.14 * grit + 0.45 * (bed.random(5) - 0.5) * piece.shown + 0.9 * (np.minimum(piece.dome, 0.7) - 0.6),
-        )
-        color, height = (
-            mix(color, stone, here),
-            mix(height, size * (0.28 * piece.dome + 0.4 * tilt + 0.1 * bed.random(6)), here),
-        )
-    return Look(tint(color, 0.04 * noise(at, 0.01, 9)), np.clip(0.88 + 0.05 * grit, 0, 1), 0.0, height - 0.0035)
+    color, height = shade(palette(0.5 + 0.2 * dust, "#57524a", "#6b655c", "#7d776c"), 0.14 * grit), 2e-4 * grit
+    for k, shape in enumerate((STONES, STONES._replace(radius=0.62))):
+        heap_of = heap(at, (0.0085, 0.021)[k], shape, 3 + k)
+        stone = each(heap_of.random(1), heap_of.shown, "#6c6a68", "#8a8782", "#a5a19a", "#7a7169", "#bdb8af", "#918b84")
+        speck = (heap_of.random(2) - 0.5) * heap_of.shown
+        light = 0.55 * heap_of.lean + 0.4 * speck + 0.16 * grit * (1 + speck) - 1.1 * (heap_of.nook - 0.2)
+        dusty = np.clip(0.25 + 0.1 * dust + 0.5 * heap_of.lean, 0, 1)
+        stone = tint(shade(stone, light), 0.12 * (heap_of.random(3) - 0.5) * heap_of.shown)
+        stone = mix(stone, shade(palette(0 * grit, "#8f897e"), 0.5 * light), 0.4 * dusty)
+        color = mix(color, stone, heap_of.cover)
+        height = mix(height, 0.9 * heap_of.height + 0.002 * k + 1e-4 * grit, heap_of.cover)
+    return Look(tint(color, 0.04 * noise(at, 0.01, 9)), np.clip(0.88 + 0.05 * grit, 0, 1), 0.0, height - 0.006)
 
 
 def jade(at: Place) -> Look:
