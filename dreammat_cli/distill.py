@@ -1,6 +1,7 @@
 """dreammat distill"""
 
 import functools
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,29 +28,46 @@ def understood(options: DistillOptions) -> Any:
     from stages.core.errors import InputError
     from stages.material.library import Library
     from stages.prior.model import load_prior
-    from stages.prior.prompt import read_prompt
+    from stages.prior.prompt import read_parts, read_prompt
 
     if options.guidance != "prior":
         raise InputError(f"--explain with --guidance {options.guidance}: it reads no words; expected --guidance prior")
     if not options.prompt.strip():
         raise InputError("--explain: no --prompt is given; say what the object is made of")
     library = Library(options.library) if options.library else None
-    return read_prompt(options.prompt, load_prior(), options.seed, options.object_size, library)
+    prior = load_prior()
+    recipe = read_prompt(options.prompt, prior, options.seed, options.object_size, library)
+    return replace(recipe, parts=read_parts(options.parts, recipe, prior, options.seed, library))
 
 
-def explain_words(common: Common, options: DistillOptions) -> None:
-    """Print what is understood of the prompt, a row for each coat."""
+def claims(conditions: Path, options: DistillOptions) -> list[str]:
+    """What is to be said of the parts, where the conditions are there already. Raises: InputError."""
+    from stages.core.artifact import read_manifest
+    from stages.core.schemas import CONDITIONS
+    from stages.distill.parts import claimed
+    from stages.distill.views import read_parts
+
+    if not options.parts or not conditions.exists():
+        return []
+    return claimed(options.parts, read_parts(conditions, read_manifest(conditions, CONDITIONS)[0])[0])[1]
+
+
+def explain_words(common: Common, conditions: Path, options: DistillOptions) -> None:
+    """Print what is understood of the prompts, a row for each coat."""
     from stages.prior.explain import HEADINGS, explained, table
 
-    recipe = understood(options)
+    lines, recipe = claims(conditions, options), understood(options)
     rows = [dict(zip(HEADINGS, row, strict=True)) for row in explained(recipe)]
-    show(common, {"prompt": options.prompt, "metres": recipe.base.metres, "coats": rows}, table(recipe))
+    show(common, {"prompt": options.prompt, "metres": recipe.base.metres, "coats": rows}, [*table(recipe), *lines])
 
 
 @click.command()
 @click.argument("conditions", type=INPUT, metavar="CONDITIONS")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="MATERIAL.npz", help="The file to write.")
 @click.option("--prompt", default=DEFAULT["prompt"], metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
+@click.option("--part", "parts", type=(str, str), multiple=True, default=DEFAULT["parts"], metavar="NAME PROMPT",
+              help="What a part is made of in place of that: its name, pattern or number as dreammat parts lists it, and its "
+                   "words. Repeat for more; where two claim the same, the later has it.")
 @click.option("--like", type=INPUT, default=DEFAULT["like"], metavar="OTHER.npz",
               help="In place of --prompt: another mesh's material, whose words, recipe and draw are taken over, as large in "
                    "space as there: by --object-size, or else by the two meshes' own units.")
@@ -102,11 +120,11 @@ def command(conditions: Path, output: Path, common: Common, explain: bool, **cho
     sd, score, hold = ({name: chosen.pop(name) for name in group} for group in (SD, SCORE, HOLD))
     options = DistillOptions(**chosen, sd=SdOptions(**sd), score=ScoreOptions(**score), hold=HoldOptions(**hold))
     if explain:
-        explain_words(common, options)
+        explain_words(common, conditions, options)
         return
     if plan(common, "distill", output, options):
         if options.guidance == "prior" and options.prompt.strip() and not common.as_json:
-            explain_words(common, options)
+            explain_words(common, conditions, options)
         return
     from stages.distill.stage import distill
 

@@ -17,7 +17,7 @@ ALLOWED = {
     "prep": {"core", "light", "material", "prior"},
     "swatch": {"core", "light", "material", "prior", "asset"},
     "conditions": {"core", "light", "material", "prior", "asset"},
-    "distill": {"core", "light", "material", "prior", "sd"},
+    "distill": {"core", "light", "material", "prior", "sd", "asset"},
     "bake": {"core", "light", "material", "prior", "asset"},
     "edit": {"core", "asset", "bake"},
     "train": {"core", "light", "material", "prior", "sd", "asset", "prep", "conditions", "distill", "bake"},

@@ -86,7 +86,7 @@ def test_a_view_is_told_what_is_baked(folder: Path) -> None:
     faces = set()
     for view in views.seen:
         surface = views.surface(view, np.arange(len(views.pixels(view))))
-        where = (surface.shown, surface.shown_normals, torch.full((len(surface.shown),), 0.002))
+        where = (surface.shown, surface.shown_normals, torch.full((len(surface.shown),), 0.002), surface.label)
         told = Base(learnt.recipe, views).material(learnt.residual, *where).columns().detach().numpy()
         hits = scene.intersect(*(np.broadcast_to(a, surface.points.shape) for a in rays(views, view, surface.points.numpy())))
         faces |= set(hits.triangle.tolist())

@@ -17,6 +17,7 @@ from stages.asset.folder import MESH
 from stages.asset.gltf import write_glb
 from stages.asset.maps import Maps
 from stages.asset.model import source_model
+from stages.asset.parts import labels
 from stages.asset.passed_on import PassedOn
 from stages.asset.textures import write_textures
 from stages.asset.traced import baked_bumps, traced_scene, world_frames
@@ -201,7 +202,8 @@ def bake_maps(
     """The material of every texel of a set, to the last one."""
     on_chart = subject.touched.triangle >= 0
     mesh = subject.mesh
-    texels = Texels(learnt, mesh["vertices"][mesh["triangles"]], mesh["normals"], subject.layout, subject.touched)
+    corners, label = mesh["vertices"][mesh["triangles"]], labels(mesh)
+    texels = Texels(learnt, corners, mesh["normals"], label, subject.layout, subject.touched)
     residual = texels.residual()
     groups = patches(subject.touched, mesh["charts"])
     unseen = mend_unseen(subject, groups, views_of(made), residual, progress)

@@ -28,13 +28,15 @@ class Texels:
     """A material on the surface that a UV layout shows.
 
     Args:
-        corners, normals: (F, 3, 3) world positions and normals of the triangles' corners. touched: of `touched_texels`.
+        corners, normals: (F, 3, 3) world positions and normals of the triangles' corners. label: (F,) of the parts. touched: of
+        `touched_texels`.
     """
 
     def __init__(
-        self, made: LearntMaterial, corners: NDArray[np.float32], normals: NDArray[np.float32], layout: Layout, touched: Surface
-    ) -> None:
-        self._made, self._corners, self._normals = made, corners, normals
+        self, made: LearntMaterial, corners: NDArray[np.float32], normals: NDArray[np.float32], label: NDArray[np.int32],
+        layout: Layout, touched: Surface,
+    ) -> None:  # fmt: skip
+        self._made, self._corners, self._normals, self._label = made, corners, normals, label
         self._layout, self._touched = layout, touched
         self._texel = texel_size(corners, layout)
         shown = np.unique(layout.face)
@@ -97,8 +99,8 @@ class Texels:
             zero = np.zeros(len(footprint), np.float32)
             convexity, occlusion = (zero, zero) if features is None else (f[texel[rows]] for f in features)
             point, normal = some.interpolate(self._corners), some.interpolate(self._normals)
-            piece = self._piece[some.triangle]
-            surface = material_surface.Surface(point, normal, footprint, convexity, occlusion, piece)
+            piece, label = self._piece[some.triangle], self._label[some.triangle]
+            surface = material_surface.Surface(point, normal, footprint, convexity, occlusion, piece, label)
             result[rows] = evaluate(self._made.recipe, surface, self._made.lookup.survey.pieces)
         return result
 

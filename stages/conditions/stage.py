@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import Tensor
 
+from stages.asset.parts import labelled_parts, labels
 from stages.asset.traced import traced_scene
 from stages.conditions.cameras import Cameras, place_cameras
 from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
@@ -93,10 +94,12 @@ def conditions(
         for light in lights:
             save_environment(out / "environments" / f"{light.name}.exr", light)
         scene = traced_scene(mesh)
-        survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.occluded)
+        label = labels(mesh)
+        survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.occluded, label)
         save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None
         shared = Representatives(mesh["uv"], mesh["charts"]) if mesh.provenance.extra["shared_texels"] else None
+        subject = Subject(scene, smooth, label, shared)
         quality, expected = QUALITY[options.quality], None
         if options.error:
             progress("choosing rays", 0, 1)
@@ -108,7 +111,7 @@ def conditions(
             written = None
             for i, view in enumerate(missing):
                 progress("views", options.views - made + i, options.views)
-                traced = trace(view, (scene, smooth, shared), cameras, lights, quality, options)
+                traced = trace(view, subject, cameras, lights, quality, options)
                 if written:
                     written.result()
                 written = writer.submit(write, out, view, lights, traced, options)
@@ -124,6 +127,8 @@ def conditions(
         "profile": options.profile,
         "clamped": clamped,
         "to_world": mesh["to_world"].ravel().tolist(),
+        "parts": [part.to_json() for part in labelled_parts(mesh)],
+        "shared_labels": shared_labels(subject),
     }
     files = expected_files(names, options)
     write_manifest(out, CONDITIONS, Provenance(request.options, request.seed, request.inputs, extra), files)
@@ -196,6 +201,23 @@ def expected_files(names: tuple[str, ...], options: ConditionsOptions) -> list[s
 
 
 @dataclass(frozen=True)
+class Subject:
+    """What is traced. smooth: the scene of the profile sd, or None. label: (F,) of each triangle. shared: by what texels are
+    represented, None where none is shared."""
+
+    scene: Scene
+    smooth: Scene | None
+    label: NDArray[np.int32]
+    shared: Representatives | None
+
+    @property
+    def area(self) -> NDArray[np.float64]:
+        """(F,) of the triangles."""
+        corners = self.scene.vertices[self.scene.triangles].astype(np.float64)
+        return np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+
+
+@dataclass(frozen=True)
 class View:
     """What is written of a view. transports: one a light. smooth, maps: of the profile sd, or None: geometry, light maps."""
 
@@ -207,26 +229,21 @@ class View:
 
 def trace(
     view: int,
-    subject: tuple[Scene, Scene | None, Representatives | None],
+    subject: Subject,
     cameras: Cameras,
     lights: list[Environment],
     quality: Quality,
     options: ConditionsOptions,
 ) -> View:
-    """One view under every environment.
-
-    Args:
-        subject: the scene; that of the profile sd; where texels are shared, by what.
-    Raises: NumericalError.
-    """
-    scene, smooth, shared = subject
+    """One view under every environment. Raises: NumericalError."""
+    scene, smooth = subject.scene, subject.smooth
     camera = cameras.c2w[view], float(cameras.fov_y[view]), options.size, options.size
     points, seed = trace_view(scene, *camera), options.seed * 1_000_003 + view
     transports = light_transport(scene, points, lights, quality, seed)
     for light, transport in zip(lights, transports, strict=True):
         check_finite(transport, light.name, view, options.seed)
-    shown = None if shared is None else shown_points(scene, points, shared)
-    geometry = Geometry(points.mask, points.depth, view_normals(points, camera[0]), shown)
+    label, shown = shown_points(subject, points)
+    geometry = Geometry(points.mask, points.depth, view_normals(points, camera[0]), label, shown)
     if smooth is None:
         return View(geometry, transports)
     points = trace_view(smooth, *camera)
@@ -255,15 +272,31 @@ def view_normals(points: GBuffer, c2w: NDArray) -> NDArray[np.float32]:
     return image
 
 
-def shown_points(scene: Scene, points: GBuffer, shared: Representatives) -> NDArray[np.float32]:
-    """What represents each pixel, as in `Geometry.shown`: (H, W, 7), 0 off the object."""
-    triangle, weights = shared.of(points.triangle, points.barycentric)
-    corners = scene.vertices[scene.triangles].astype(np.float64)
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    scale = shared.scale(area, points.triangle, triangle)
-    image = np.zeros((*points.mask.shape, 7), np.float32)
-    image[points.mask] = np.c_[scene.point(triangle, weights), scene.smooth_normal(triangle, weights), scale]
-    return image
+def shown_points(subject: Subject, points: GBuffer) -> tuple[NDArray[np.int32], NDArray[np.float32] | None]:
+    """Labels, and what represents each pixel, as in `Geometry.label` and `shown`."""
+    scene, shared, triangle = subject.scene, subject.shared, points.triangle
+    label, image = np.zeros(points.mask.shape, np.int32), None
+    if shared is not None:
+        triangle, weights = shared.of(points.triangle, points.barycentric)
+        scale = shared.scale(subject.area, points.triangle, triangle)
+        image = np.zeros((*points.mask.shape, 7), np.float32)
+        image[points.mask] = np.c_[scene.point(triangle, weights), scene.smooth_normal(triangle, weights), scale]
+    label[points.mask] = subject.label[triangle]
+    return label, image
+
+
+def shared_labels(subject: Subject) -> list[tuple[int, int, float]]:
+    """Which labels show texels of which others, as in `CONDITIONS`, judged by the triangles' centres."""
+    if subject.shared is None:
+        return []
+    every = np.arange(len(subject.label), dtype=np.int32)
+    found, _ = subject.shared.of(every, np.full((len(every), 3), 1 / 3))
+    own, theirs = subject.label, subject.label[found]
+    other, area = own != theirs, subject.area
+    whole = np.bincount(own, area)
+    pairs, row = np.unique(np.stack([own[other], theirs[other]], 1), axis=0, return_inverse=True)
+    share = np.bincount(row.reshape(-1), area[other], len(pairs)) / np.maximum(whole[pairs[:, 0]], np.finfo(float).tiny)
+    return [(int(a), int(b), round(float(s), 6)) for (a, b), s in zip(pairs, share, strict=True)]
 
 
 def check_finite(transport: Transport, environment: str, view: int, seed: int) -> None:

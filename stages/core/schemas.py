@@ -55,23 +55,26 @@ CAMERAS = Schema(
 
 CONDITIONS = Schema(
     "dreammat.conditions",
-    2,
+    3,
     # environments: names; views: count; knots: roughness of each A and B; clamped: name -> mended texels;
     # to_world: 16 numbers, the mesh source's frame to world, row by row; profile: "gltf", or "sd", which has files of its own
-    extra=("environments", "views", "knots", "clamped", "to_world"),
+    # parts: {"number", "kind", "name", "share", "labels"} each, see `asset.parts`; shared_labels: [label, label that represents
+    # it in a texel that both share, share of the first's area] each
+    extra=("environments", "views", "knots", "clamped", "to_world", "parts", "shared_labels"),
 )
 """A folder: cameras.npz, survey.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr; see
 `core.views`."""
 
 SURVEY = Schema(
     "dreammat.survey",
-    1,
+    2,
     {
         "survey_point": Field("f4", ("Q", 3)),  # points of the surface, world
         "survey_normal": Field("f2", ("Q", 3)),
         "survey_convexity": Field("f2", ("Q",)),  # -1 in a crease to 1 on an edge
         "survey_occlusion": Field("f2", ("Q",)),  # share of the sky that the object hides
         "survey_piece": Field("i4", ("Q",)),  # row of the pieces; 0 is the whole object
+        "survey_label": Field("i4", ("Q",)),  # of the parts, see `asset.parts.labels`
         "pieces_centre": Field("f4", ("PK", 3)),
         "pieces_turn": Field("f4", ("PK", 3, 3)),
         "pieces_radius": Field("f4", ("PK",)),
@@ -82,7 +85,7 @@ SURVEY = Schema(
 
 MATERIAL = Schema(
     "dreammat.material",
-    2,
+    3,
     {
         **SURVEY.fields,
         "table": Field("f4", ("T", "C")),  # the residual's hash grid entries, all levels in one table

@@ -1,6 +1,7 @@
 """The files of one view in a conditions folder: geometry and, per environment, light transport.
 
-    view_007/geometry.exr       depth (planar, 0 off the object), normal.R|G|B (view space), mask; float32
+    view_007/geometry.exr       depth (planar, 0 off the object), normal.R|G|B (view space), mask, and label, the number of
+                                the part that each pixel belongs to (`asset.parts.labels`); float32
                                 and, where places of the surface share texels, the point that represents each pixel's:
                                 shown.X|Y|Z, shown_normal.X|Y|Z (world), shown_scale; see `Geometry`
     view_007/<environment>.exr  E.R|G|B, A<k>.R|G|B, B<k>.R|G|B for knot k of `core.shading.KNOTS`,
@@ -45,13 +46,15 @@ DROPPED = 3
 class Geometry:
     """What a camera sees of the object: mask (H, W) bool, planar depth (H, W), view-space unit normal (H, W, 3).
 
-    shown: (H, W, 7) or None where every place has texels of its own: the point of the surface that the texel of each pixel
-    represents, world, its normal there, and how many times larger the texture lies there.
+    label: (H, W) of what is seen, or of what represents it; 0 off the object. shown: (H, W, 7) or None where every place has
+    texels of its own: the point of the surface that the texel of each pixel represents, world, its normal there, and how many
+    times larger the texture lies there.
     """
 
     mask: NDArray[np.bool_]
     depth: NDArray[np.float32]
     normal: NDArray[np.float32]
+    label: NDArray[np.int32]
     shown: NDArray[np.float32] | None = None
 
 
@@ -77,6 +80,7 @@ def write_geometry(folder: Path, view: int, geometry: Geometry, profile: str = "
     window = object_window(geometry.mask)
     channels = {"depth": geometry.depth[window], "mask": geometry.mask[window].astype(np.float32)}
     channels |= {f"normal.{c}": geometry.normal[window][..., i] for i, c in enumerate("RGB")}
+    channels["label"] = geometry.label[window].astype(np.float32)
     if geometry.shown is not None:
         channels |= {name: geometry.shown[window][..., i] for i, name in enumerate(SHOWN)}
     _write(folder / view_folder(view) / profile / "geometry.exr", channels, geometry.mask.shape, window, {})
@@ -91,13 +95,13 @@ def read_geometry(folder: Path, view: int, profile: str = "", files: Mapping[str
     """
     path = _checked(folder, Path(view_folder(view), profile, "geometry.exr"), files)
     image = read_exr(path)
-    names = ["depth", "mask", *(f"normal.{c}" for c in "RGB")]
+    names = ["depth", "mask", "label", *(f"normal.{c}" for c in "RGB")]
     _expect(path, image, names + [*SHOWN] * (SHOWN[0] in image.names))
     if max(image.display) > LARGEST_VIEW:
         raise ArtifactError(f"{path}: announces {image.display[1]} x {image.display[0]} pixels; make the conditions again")
-    depth, mask, *normal = (image.full(name) for name in names)
+    depth, mask, label, *normal = (image.full(name) for name in names)
     shown = np.stack([image.full(name) for name in SHOWN], -1) if SHOWN[0] in image.names else None
-    return Geometry(mask > 0.5, depth, np.stack(normal, -1), shown)
+    return Geometry(mask > 0.5, depth, np.stack(normal, -1), np.rint(label).astype(np.int32), shown)
 
 
 def transport_channels() -> list[str]:

@@ -23,17 +23,21 @@ class Like:
     digest: str
 
     def carried(self, extent: float, metres: float | None) -> Recipe:
-        """The recipe on another object, not settled, its structure as large in space as on its own.
+        """The recipe on another object, not settled, its structure as large in space as on its own; its parts nowhere yet.
 
         Args:
             extent: the other object's, in the same units. metres: its longest edge, where it is told.
         """
-        times = metres / self.recipe.base.metres if metres is not None else extent / self.extent
-        layers = []
-        for layer in self.recipe.layers:
-            masks = tuple(_unsettled(mask, times) for mask in layer.masks)
-            layers.append(replace(layer, coat=_resized(layer.coat, times), masks=masks))
-        return replace(self.recipe, base=_resized(self.recipe.base, times), layers=tuple(layers))
+        return _carried(self.recipe, metres / self.recipe.base.metres if metres is not None else extent / self.extent)
+
+
+def _carried(recipe: Recipe, times: float) -> Recipe:
+    layers = []
+    for layer in recipe.layers:
+        masks = tuple(_unsettled(mask, times) for mask in layer.masks)
+        layers.append(replace(layer, coat=_resized(layer.coat, times), masks=masks))
+    parts = (replace(part, labels=(), recipe=_carried(part.recipe, times)) for part in recipe.parts)
+    return replace(recipe, base=_resized(recipe.base, times), layers=tuple(layers), parts=tuple(parts))
 
 
 def _unsettled(mask: Mask, times: float) -> Mask:

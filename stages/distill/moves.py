@@ -62,9 +62,7 @@ class Moves(nn.Module):
     def moved(self, recipe: Recipe) -> Recipe:
         """The recipe with the moves in it."""
         offsets = self.bounded().detach().cpu().double().numpy()
-        base, *layers = (_moved(coat, row) for coat, row in zip(recipe.coats, offsets, strict=True))
-        over = tuple(replace(old, coat=coat) for old, coat in zip(recipe.layers, layers, strict=True))
-        return replace(recipe, base=base, layers=over)
+        return recipe.with_coats([_moved(coat, row) for coat, row in zip(recipe.coats, offsets, strict=True)])
 
 
 def told(before: Recipe, after: Recipe) -> list[str]:

@@ -49,6 +49,7 @@ class DistillOptions:
     seed: int = 0  # *
     device: str = "cpu"  # * a torch device
     prompt: str = ""  # what the object is made of
+    parts: tuple[tuple[str, str], ...] = ()  # name, pattern or number of parts, and what each is made of in its place
     like: Path | None = None  # material.npz whose prompt, recipe and draw are taken over, at the same physical scale
     object_size: float | None = None  # metres, longest edge; None: what the prompt's words say
     library: Path | None = None  # folder of scanned materials, which are preferred

@@ -40,7 +40,7 @@ def _row(views: Views, view: int, environment: int, base: Base, residual: Residu
     shown = np.flatnonzero((row % stride == 0) & (column % stride == 0))
     surface = views.surface(view, shown)
     transport = views.read_transport((view, environment))[torch.from_numpy(shown)].to(device, torch.float32)
-    where = (surface.shown, surface.shown_normals, stride * views.widths(view, surface))
+    where = (surface.shown, surface.shown_normals, stride * views.widths(view, surface), surface.label)
     material = base.material(residual, *(t.to(device) for t in where))
     scale = EXPOSURE / transport.E.mean().clamp(min=1e-6)
     pictures = (

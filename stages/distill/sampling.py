@@ -48,7 +48,7 @@ class Images:
 @dataclass(frozen=True)
 class Sample:
     """What one step shows: P points, each under `lights` = L lights. points, normals: (P, 3) world, where their material is
-    asked for (on shared texels what represents them). footprint: (P,) there.
+    asked for (on shared texels what represents them). footprint, label: (P,) there.
 
     transport: of P L rows, all lights of a point after each other. source: (view, environment) of each image, for messages.
     images: the layout of crops; rows: (P,) of loose pixels in their pool. The one that does not apply is None. given: what the
@@ -58,6 +58,7 @@ class Sample:
     points: Tensor
     normals: Tensor
     footprint: Tensor
+    label: Tensor
     lights: int
     transport: Transport
     source: tuple[tuple[int, int], ...] = ()
@@ -70,8 +71,8 @@ class Sample:
         assert self.rows is not None
         lit = (chosen[:, None] * self.lights + torch.arange(self.lights, device=chosen.device)).flatten()
         rows = self.rows[chosen.to(self.rows.device)]
-        points, normals, footprint = (t[chosen] for t in (self.points, self.normals, self.footprint))
-        return Sample(points, normals, footprint, self.lights, self.transport[lit], rows=rows)
+        points, normals, footprint, label = (t[chosen] for t in (self.points, self.normals, self.footprint, self.label))
+        return Sample(points, normals, footprint, label, self.lights, self.transport[lit], rows=rows)
 
 
 class Sampler(Protocol):
@@ -111,7 +112,8 @@ class CropSampler:
         where = torch.from_numpy(pixel).to(self._device)
         images = Images(self._batch, self._size, where, surface, azimuth, elevation, self._maps(keys, crops))
         width = torch.cat(footprint).to(self._device)
-        return Sample(surface.shown, surface.shown_normals, width, 1, transport, tuple(keys), images=images)
+        points, normals, label = surface.shown, surface.shown_normals, surface.label
+        return Sample(points, normals, width, label, 1, transport, tuple(keys), images=images)
 
     def _maps(
         self, keys: list[tuple[int, int]], crops: list[tuple[NDArray[np.int64], NDArray[np.int64], int]]
@@ -174,9 +176,10 @@ class PixelSampler:
         share = min(1.0, CACHE_BYTES / _pool_bytes(views))
         rows = [_subset(len(views.pixels(view)), share, generator) for view in views.seen]
         surfaces = [views.surface(view, chosen) for view, chosen in zip(views.seen, rows, strict=True)]
-        self.points, *shown = (torch.cat([getattr(s, name) for s in surfaces]) for name in ("points", "shown", "shown_normals"))
+        names = ("points", "shown", "shown_normals", "label")
+        self.points, *shown, label = (torch.cat([getattr(s, name) for s in surfaces]) for name in names)
         widths = [views.widths(view, s) for view, s in zip(views.seen, surfaces, strict=True)]
-        self._where = (*shown, torch.cat(widths))  # points, normals and footprints of the material
+        self._where = (*shown, torch.cat(widths), label)  # points, normals, footprints and labels of the material
         eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
         self.eyes = torch.from_numpy(eyes.astype(np.float32))
         self._lights = _pooled_lights(views, rows)  # (M, L, WIDTH)
@@ -188,12 +191,10 @@ class PixelSampler:
 
     def at(self, rows: Tensor) -> Sample:
         """The sample of given rows (P,) of the pool."""
-        points, normals, footprint = (t.index_select(0, rows) for t in self._where)
+        points, normals, footprint, label = (t.index_select(0, rows).to(self.device) for t in self._where)
         lights = self._lights.index_select(0, rows)
         packed = lights.to(self.device).float().flatten(0, 1)
-        transport = Transport.unpack(packed)
-        device = self.device
-        return Sample(points.to(device), normals.to(device), footprint.to(device), lights.shape[1], transport, rows=rows)
+        return Sample(points, normals, footprint, label, lights.shape[1], Transport.unpack(packed), rows=rows)
 
     def prefetch(self, generator: torch.Generator) -> None:
         """Nothing to do: the pool is in memory."""

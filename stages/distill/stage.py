@@ -5,8 +5,8 @@ import dataclasses
 import math
 import time
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,7 +29,9 @@ from stages.distill.like import Like, read_like
 from stages.distill.moves import Moves, told
 from stages.distill.optimizer import RowAdam
 from stages.distill.options import QUALITY, DistillOptions
+from stages.distill.parts import Claim, claimed, shared
 from stages.distill.preview import write_preview
+from stages.distill.regions import Regions
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
 from stages.distill.start import least_like_light
 from stages.distill.views import Views
@@ -100,7 +102,9 @@ def _distill(
     like = None if options.like is None else read_like(options.like, options)
     options = options if like is None else dataclasses.replace(options, prompt=like.prompt)
     views = Views(conditions)
-    guidance = make_guidance(options, views, device, like)
+    carried = [(part.name, part.prompt) for part in like.recipe.parts] if like else []
+    claims, lines = claimed(options.parts, views.parts, carried)
+    guidance = make_guidance(options, views, device, claims, like)
     budget = chosen_budget(options, guidance.budget)
     request = _request(options, budget, views, guidance, like)
     if not force and (done := peek(out, MATERIAL)) and done.same_request(request):
@@ -112,7 +116,8 @@ def _distill(
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
         run = Run(out, views, guidance, base, options, budget, request, state, clock)
-        for line in parts(base.recipe) if guidance.recipe != EVEN else ():
+        lines += shared(claims, views.shared_labels)
+        for line in [*lines, *(parts(base.recipe) if guidance.recipe != EVEN else ())]:
             tell(line)
         if not resumed:
             _preview(run)  # what the words alone give
@@ -147,9 +152,17 @@ def chosen_budget(options: DistillOptions, called_for: Budget) -> Budget:
     return Budget(steps, options.learning_rate or called_for.learning_rate)
 
 
-def make_guidance(options: DistillOptions, views: Views, device: torch.device, like: Like | None = None) -> Guidance:
-    """The guidance that the options name. Args: like: whose recipe it begins with. Raises: InputError, ArtifactError."""
+def make_guidance(
+    options: DistillOptions, views: Views, device: torch.device, claims: Sequence[Claim] = (), like: Like | None = None
+) -> Guidance:
+    """The guidance that the options name.
+
+    Args: claims: the parts that have prompts of their own. like: whose recipe it begins with.
+    Raises: InputError, ArtifactError.
+    """
     if options.guidance == "reference":
+        if options.parts:
+            raise InputError("--part with --guidance reference: it reads no words; expected --guidance prior or sd")
         from stages.distill.guidance import reference
         from stages.light.textured_model import TexturedModel
 
@@ -166,10 +179,10 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device, l
     if options.object_size is not None and not LEAST <= options.object_size <= MOST:
         raise InputError(f"--object-size {options.object_size:g}: expected {LEAST:g} to {MOST:g} metres")
     if options.guidance == "sd":
-        return _stable_diffusion(options, views, device)
+        return _stable_diffusion(options, views, device, claims)
     from stages.distill.guidance import prior
     from stages.prior.model import load_prior
-    from stages.prior.prompt import read_prompt
+    from stages.prior.prompt import read_parts, read_prompt
 
     model = load_prior(device)
     sampler = CropSampler(views, model.size, options.batch, device, options.score.lights)
@@ -179,26 +192,28 @@ def make_guidance(options: DistillOptions, views: Views, device: torch.device, l
         recipe = read_prompt(options.prompt, model, options.seed, options.object_size, library)
     else:
         recipe = like.carried(views.extent(), options.object_size)
+    own = (*recipe.parts, *read_parts(options.parts, recipe, model, options.seed, library))
+    recipe = replace(recipe, parts=tuple(replace(own[claim.number], labels=claim.labels) for claim in claims))
     scans = library.used({coat.look for coat in recipe.coats}) if library else {}
 
     def begin() -> Recipe:
         return recipe if like is not None else least_like_light(recipe, views, step_generator(options.seed, POOL))
 
-    guidance = prior.PriorGuidance(model, sampler, options, begin)
+    guidance = prior.PriorGuidance(model, sampler, options, begin, Regions(claims))
     if scans:
         guidance.identity = guidance.identity | {"library": scans}
         guidance.inputs |= hashes(scans)
     return guidance
 
 
-def _stable_diffusion(options: DistillOptions, views: Views, device: torch.device) -> Guidance:
+def _stable_diffusion(options: DistillOptions, views: Views, device: torch.device, claims: Sequence[Claim]) -> Guidance:
     from stages.distill.guidance import sd
     from stages.sd import files, memory, models
 
     found = files.find_models(options.sd)
     sampler = CropSampler(views, sd.view_size(views, found), options.batch, device, options.score.lights)
     model = models.load_models(found, device, memory.plan(options.sd.vram, device))
-    return sd.StableDiffusionGuidance(model, sampler, options)
+    return sd.StableDiffusionGuidance(model, sampler, options, Regions(claims))
 
 
 def new_state(options: DistillOptions, views: Views, device: torch.device, recipe: Recipe) -> State:

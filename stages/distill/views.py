@@ -20,8 +20,9 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor
 
+from stages.asset.parts import LabelledPart
 from stages.core import schemas
-from stages.core.artifact import MANIFEST, intact, load_npz, read_manifest, sha256_file
+from stages.core.artifact import MANIFEST, Provenance, intact, load_npz, read_manifest, sha256_file
 from stages.core.errors import ArtifactError
 from stages.core.shading import KNOTS, LIGHT_MAPS, WIDTH, Transport
 from stages.core.views import SD, read_geometry, read_light_maps, read_transport
@@ -43,7 +44,7 @@ class Surface:
     """Surface points: position and unit normal in the world (P, 3), planar depth (P,), view-space normal (P, 3).
 
     shown, shown_normals: (P, 3) where the material of each is asked for: the point itself, or what represents its texel.
-    scale: (P,) how many times larger the texture lies there.
+    label: (P,) int64, of the parts that lie there. scale: (P,) how many times larger the texture does.
     """
 
     points: Tensor
@@ -52,6 +53,7 @@ class Surface:
     view_normals: Tensor
     shown: Tensor
     shown_normals: Tensor
+    label: Tensor
     scale: Tensor
 
 
@@ -60,6 +62,7 @@ class _Geometry:
     pixels: NDArray[np.int32]  # (P,) flat index of each object pixel, ascending
     depth: NDArray[np.float32]  # (P,)
     normal: NDArray[np.float16]  # (P, 3) view space
+    label: NDArray[np.int32]  # (P,)
     shown: NDArray[np.float32] | None  # (P, 7) as in `core.views.Geometry`
 
 
@@ -81,6 +84,7 @@ class Views:
         self.environments: list[str] = list(provenance.extra["environments"])
         self.to_world = np.array(provenance.extra.get("to_world", np.eye(4).ravel()), np.float64).reshape(4, 4)
         self.has_light_maps = provenance.extra.get("profile") == SD
+        self.parts, self.shared_labels = read_parts(folder, provenance)
         if tuple(provenance.extra["knots"]) != KNOTS:
             raise ArtifactError(f"{folder}: roughness knots differ from this version's; make the conditions again")
         self._geometry = self._read_geometry()
@@ -124,7 +128,9 @@ class Views:
         point, turned = local @ rotation.T + eye, normal @ rotation.T
         shown = np.c_[point, turned, np.ones(len(rows))] if geometry.shown is None else geometry.shown[rows]
         arrays = (point, turned, geometry.depth[rows], normal, shown[:, :3], shown[:, 3:6], shown[:, 6])
-        return Surface(*(torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in arrays))
+        floats = [torch.from_numpy(np.ascontiguousarray(a, np.float32)) for a in arrays]
+        label = torch.from_numpy(geometry.label[rows].astype(np.int64))
+        return Surface(*floats[:6], label=label, scale=floats[6])  # type: ignore[misc]
 
     def transport(self, view: int, environment: int) -> Transport:
         """Light transport of all object pixels of a view, float16."""
@@ -156,7 +162,8 @@ class Views:
                 raise ArtifactError(f"{self.folder}: view {view} is not {self.width} x {self.height}; make it again")
             normal = geometry.normal.reshape(-1, 3)[mask].astype(np.float16)
             shown = None if geometry.shown is None else geometry.shown.reshape(-1, 7)[mask]
-            return _Geometry(np.flatnonzero(mask).astype(np.int32), geometry.depth.ravel()[mask], normal, shown)
+            depth, label = geometry.depth.ravel()[mask], geometry.label.ravel()[mask]
+            return _Geometry(np.flatnonzero(mask).astype(np.int32), depth, normal, label, shown)
 
         with ThreadPoolExecutor(READERS) as pool:
             return list(pool.map(read, range(len(self.c2w))))
@@ -176,6 +183,15 @@ class Views:
         mask = np.zeros((self.height, self.width), bool)
         mask.ravel()[self._geometry[view].pixels] = True
         return mask
+
+
+def read_parts(folder: Path, provenance: Provenance) -> tuple[list[LabelledPart], list[tuple[int, int, float]]]:
+    """The parts by name, and which labels share texels, as `CONDITIONS` has them. Raises: ArtifactError."""
+    try:
+        parts = [LabelledPart.from_json(part) for part in provenance.extra["parts"]]
+        return parts, [(int(own), int(other), float(share)) for own, other, share in provenance.extra["shared_labels"]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtifactError(f"{folder}: its list of parts cannot be read ({error}); make the conditions again") from error
 
 
 class _Cache(Generic[Light]):

@@ -1,9 +1,12 @@
 """The material that a recipe gives to points of a surface: the one function that bake, distill, previews and swatches share."""
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stages.core.color import srgb_decode
 from stages.material.directions import WHOLE, Pieces, along
@@ -31,6 +34,37 @@ def evaluate(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Array:
 
 def evaluate_coats(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> tuple[Array, Array]:
     """The same, and how much of each point is each coat's: (P, K), which sum to 1."""
+    result = np.empty((len(surface), COLUMNS), np.float32)
+    shares = np.zeros((len(surface), len(recipe.coats)), np.float32)
+    first = 0
+    for own, rows in by_part(recipe, surface.label):
+        columns = slice(first, first + len(own.coats))
+        result[rows], shares[rows, columns] = _alone(own, surface[rows], pieces)
+        first = columns.stop
+    return result, shares
+
+
+def by_part(recipe: Recipe, label: NDArray[np.int32]) -> Iterator[tuple[Recipe, NDArray[np.int64] | slice]]:
+    """The recipe of what is no part, and of each part, with the points that have it. Args: label: (P,)."""
+    if not recipe.parts:
+        yield recipe, slice(None)
+        return
+    owner = owners([part.labels for part in recipe.parts], label)
+    for number, own in enumerate((replace(recipe, parts=()), *(part.recipe for part in recipe.parts))):
+        yield own, np.flatnonzero(owner == number)
+
+
+def owners(parts: Sequence[Sequence[int]], label: NDArray) -> NDArray[np.int64]:
+    """(P,) the part, from 1, that each point belongs to; 0 for those of none. Args: parts: labels of each. label: (P,)."""
+    most = max((max(labels) for labels in parts if labels), default=0)
+    owner = np.zeros(max(most, int(label.max(initial=0))) + 1, np.int64)
+    for number, labels in enumerate(parts, 1):
+        owner[list(labels)] = number
+    return owner[label]
+
+
+def _alone(recipe: Recipe, surface: Surface, pieces: Pieces) -> tuple[Array, Array]:
+    """`evaluate_coats` of a recipe without parts."""
     result = np.empty((len(surface), COLUMNS), np.float32)
     shares = np.empty((len(surface), len(recipe.coats)), np.float32)
     uv, face = along(pieces, surface.piece, surface.point, surface.normal)

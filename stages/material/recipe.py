@@ -1,9 +1,11 @@
 """What a thing is made of, as a procedure: a base and layers over it, each a substance and a mask that says where it lies.
+Parts of the thing may have recipes of their own.
 
 A recipe is plain data, so that it can be printed, stored in material.npz and edited. It has no resolution and knows no mesh.
 What follows a mesh (the lowest tenth, a fifth of the edges) is settled by `masks.settled` once the surface is known. """
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 KINDS = (
@@ -66,11 +68,13 @@ class Layer:
 
 @dataclass(frozen=True)
 class Recipe:
-    """Base and layers, from below. seed: of everything left to chance; it changes patterns, not stuff."""
+    """Base and layers, from below. seed: of everything left to chance; it changes patterns, not stuff. parts: what has another
+    recipe, with borders as sharp as the mesh's own; none shares a label with another."""
 
     base: Coat
     layers: tuple[Layer, ...] = field(default=())
     seed: int = 0
+    parts: tuple["Part", ...] = field(default=())
 
     def to_json(self) -> dict[str, Any]:
         """As JSON types."""
@@ -83,7 +87,7 @@ class Recipe:
             Layer(_coat(raw["coat"]), tuple(map(_mask, raw["masks"])), raw["thickness"], raw["strength"])
             for raw in data["layers"]
         )
-        return Recipe(_coat(data["base"]), layers, data["seed"])
+        return Recipe(_coat(data["base"]), layers, data["seed"], tuple(map(_part, data["parts"])))
 
     @property
     def has_relief(self) -> bool:
@@ -93,16 +97,43 @@ class Recipe:
     @property
     def follows_surface(self) -> bool:
         """Whether any mask asks for edges, creases or what is hidden."""
-        return any(mask.kind in SURVEYED for layer in self.layers for mask in layer.masks)
+        own = any(mask.kind in SURVEYED for layer in self.layers for mask in layer.masks)
+        return own or any(part.recipe.follows_surface for part in self.parts)
 
     @property
     def coats(self) -> tuple[Coat, ...]:
-        """The base's and each layer's."""
-        return (self.base, *(layer.coat for layer in self.layers))
+        """The base's and each layer's, then those of the parts."""
+        own = (self.base, *(layer.coat for layer in self.layers))
+        return own + tuple(coat for part in self.parts for coat in part.recipe.coats)
+
+    def with_coats(self, coats: Sequence[Coat]) -> "Recipe":
+        """The same with other coats, in the order of `coats`."""
+        base, *rest = coats
+        layers = tuple(replace(layer, coat=rest.pop(0)) for layer in self.layers)
+        parts = []
+        for part in self.parts:
+            own, rest = rest[: len(part.recipe.coats)], rest[len(part.recipe.coats) :]
+            parts.append(replace(part, recipe=part.recipe.with_coats(own)))
+        return replace(self, base=base, layers=layers, parts=tuple(parts))
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a thing. name: what it was called by. prompt: its words. labels: of its surface, see `Surface.label`; none
+    before any mesh is known. recipe: without parts."""
+
+    name: str
+    prompt: str
+    labels: tuple[int, ...]
+    recipe: Recipe
 
 
 def _mask(data: dict[str, Any]) -> Mask:
     return Mask(**{**data, **{name: tuple(data.get(name, ())) for name in ("pieces", "axis")}})
+
+
+def _part(data: dict[str, Any]) -> Part:
+    return Part(data["name"], data["prompt"], tuple(data["labels"]), Recipe.from_json(data["recipe"]))
 
 
 def _coat(data: dict[str, Any]) -> Coat:

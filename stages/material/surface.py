@@ -15,7 +15,8 @@ class Surface:
     """Points at which a material is asked for, in the world: the object's longest edge is 1, z is up.
 
     point, normal: (P, 3). footprint: (P,) edge of the texel or pixel that each stands for. convexity: (P,) −1 in a crease … 1
-    on an edge. occlusion: (P,) share of the sky that the object hides. piece: (P,) int32, row of the survey's pieces. """
+    on an edge. occlusion: (P,) share of the sky that the object hides. piece: (P,) int32, row of the survey's pieces. label:
+    (P,) int32, of the parts that each belongs to. """
 
     point: Array
     normal: Array
@@ -23,6 +24,7 @@ class Surface:
     convexity: Array
     occlusion: Array
     piece: NDArray[np.int32]
+    label: NDArray[np.int32]
 
     def __len__(self) -> int:
         return len(self.point)
@@ -35,5 +37,5 @@ class Surface:
         """Of a surface of which nothing more is known: one open, even piece."""
         count = len(point)
         size = np.broadcast_to(np.float32(footprint), count)
-        zero = np.zeros(count, np.float32)
-        return Surface(point, normal, size, zero, zero, np.zeros(count, np.int32))
+        zero, none = np.zeros(count, np.float32), np.zeros(count, np.int32)
+        return Surface(point, normal, size, zero, zero, none, none)

@@ -20,6 +20,9 @@ from stages.material.surface import Array, Surface
 POINTS, EDGE_POINTS = 50_000, 30_000
 """Points spread evenly, and those beside sharp edges."""
 
+OF_LABEL, OF_SMALL = 64, 20_000
+"""Points that each label gets at least, and how many there are at most for those labels whose share is too small for that."""
+
 SHARP = 0.85
 """Neighbouring triangles whose normals agree by less than this cosine, 32 degrees, meet in an edge or a crease."""
 
@@ -43,26 +46,27 @@ Blocked = Callable[[NDArray[np.float32], NDArray[np.float32]], NDArray[np.bool_]
 
 
 class Survey(NamedTuple):
-    """point, normal: (S, 3) world. convexity, occlusion: (S,). piece: (S,) int32, row of `pieces`. pieces: what hangs
-    together."""
+    """point, normal: (S, 3) world. convexity, occlusion: (S,). piece: (S,) int32, row of `pieces`. label: (S,) int32, of the
+    parts. pieces: what hangs together."""
 
     point: Array
     normal: Array
     convexity: Array
     occlusion: Array
     piece: NDArray[np.int32]
+    label: NDArray[np.int32]
     pieces: Pieces
 
     def surface(self) -> Surface:
         """The survey's own points as a surface."""
         size = np.full(len(self.point), np.float32(1e-3))
-        return Surface(self.point, self.normal, size, self.convexity, self.occlusion, self.piece)
+        return Surface(self.point, self.normal, size, self.convexity, self.occlusion, self.piece, self.label)
 
     def to_arrays(self) -> dict[str, NDArray]:
         """By name, as `from_arrays` wants them; half floats where they do."""
         rows = {"point": self.point, "normal": self.normal, "convexity": self.convexity, "occlusion": self.occlusion}
         arrays: dict[str, NDArray] = {f"survey_{name}": value.astype(np.float16) for name, value in rows.items()}
-        arrays |= {"survey_point": self.point, "survey_piece": self.piece}
+        arrays |= {"survey_point": self.point, "survey_piece": self.piece, "survey_label": self.label}
         return arrays | {f"pieces_{name}": value for name, value in self.pieces._asdict().items()}
 
     @staticmethod
@@ -72,7 +76,7 @@ class Survey(NamedTuple):
         point, normal, convex, hidden = (
             arrays[f"survey_{name}"].astype(np.float32) for name in ("point", "normal", "convexity", "occlusion")
         )
-        return Survey(point, normal, convex, hidden, arrays["survey_piece"], pieces)
+        return Survey(point, normal, convex, hidden, arrays["survey_piece"], arrays["survey_label"], pieces)
 
 
 class Lookup:
@@ -82,11 +86,14 @@ class Lookup:
         self.survey = survey
         self._tree = cKDTree(survey.point, balanced_tree=False, compact_nodes=False)
 
-    def surface(self, point: Array, normal: Array, footprint: Array) -> Surface:
+    def surface(
+        self, point: Array, normal: Array, footprint: Array, label: NDArray[np.int32] | None = None
+    ) -> Surface:
         """Points with what the survey knows there: the nearest of its points, those that face the same way first.
 
         Args:
-            point, normal: (P, 3) world. footprint: (P,).
+            point, normal: (P, 3) world. footprint: (P,). label: (P,); None for that of the nearest point, which near the
+            border of two parts may be the other's.
         """
         if not len(point):
             return Surface.bare(point, normal, footprint)
@@ -96,7 +103,8 @@ class Lookup:
         weight = (weight / weight.sum(1, keepdims=True)).astype(np.float32)
         convexity, occlusion = ((weight * values[index]).sum(1) for values in (self.survey.convexity, self.survey.occlusion))
         best = np.take_along_axis(index, weight.argmax(1)[:, None], 1)[:, 0]
-        return Surface(point, normal, footprint, convexity, occlusion, self.survey.piece[best])
+        own = self.survey.label[best] if label is None else label
+        return Surface(point, normal, footprint, convexity, occlusion, self.survey.piece[best], own)
 
 
     def shared(
@@ -152,12 +160,14 @@ def _mix(point, normal, group, near, known, mixed):  # type: ignore[no-untyped-d
         mixed[0, p], mixed[1, p] = convexity / total, occlusion / total
 
 
-def make_survey(vertices: Array, triangles: NDArray[np.int32], normals: Array, blocked: Blocked, seed: int = 0) -> Survey:
+def make_survey(
+    vertices: Array, triangles: NDArray[np.int32], normals: Array, blocked: Blocked, label: NDArray[np.int32], seed: int = 0
+) -> Survey:
     """Survey a mesh.
 
     Args:
         vertices: (V, 3) world, welded. triangles: (F, 3). normals: (F, 3, 3) shading normal of each corner. blocked: traces
-        rays.
+        rays. label: (F,) of the parts.
     """
     rng = np.random.default_rng(seed)
     corners = vertices[triangles].astype(np.float64)
@@ -165,7 +175,8 @@ def make_survey(vertices: Array, triangles: NDArray[np.int32], normals: Array, b
     area = np.linalg.norm(cross, axis=1) / 2
     face, weights = _everywhere(area, rng)
     edge_face, edge_weights = _beside_edges(triangles, corners, cross, rng)
-    face, weights = np.concatenate([face, edge_face]), np.concatenate([weights, edge_weights])
+    small_face, small_weights = _on_small(area, label, rng)
+    face, weights = np.concatenate([face, edge_face, small_face]), np.concatenate([weights, edge_weights, small_weights])
     point = np.einsum("pk,pkd->pd", weights, corners[face]).astype(np.float32)
     normal = np.einsum("pk,pkd->pd", weights, normals[face])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -174,7 +185,8 @@ def make_survey(vertices: Array, triangles: NDArray[np.int32], normals: Array, b
     shares = np.where(np.arange(len(face)) < POINTS, area.sum() / POINTS, 0.0)
     pieces, row = measure(point, normal, shares, of_vertex[triangles[face, 0]])
     flat = (cross[face] / np.maximum(2 * area[face], 1e-30)[:, None]).astype(np.float32)
-    return Survey(point, normal, convexity(point, normal), occlusion(point, normal, flat, blocked, rng), row, pieces)
+    hidden = occlusion(point, normal, flat, blocked, rng)
+    return Survey(point, normal, convexity(point, normal), hidden, row, label[face], pieces)
 
 
 def connected_pieces(triangles: NDArray[np.int32], count: int) -> NDArray[np.int64]:
@@ -189,9 +201,27 @@ def _everywhere(area: NDArray, rng: np.random.Generator) -> tuple[NDArray[np.int
     """Triangles and barycentric weights of points spread evenly."""
     total = np.cumsum(area)
     u = (np.arange(POINTS) + rng.random(POINTS)) / POINTS * total[-1]
-    face = np.searchsorted(total, u, side="right").clip(max=len(area) - 1)
-    root, other = np.sqrt(rng.random(POINTS)), rng.random(POINTS)
-    return face, np.stack([1 - root, root * (1 - other), root * other], 1)
+    return np.searchsorted(total, u, side="right").clip(max=len(area) - 1), _weights(POINTS, rng)
+
+
+def _weights(count: int, rng: np.random.Generator) -> NDArray:
+    """Barycentric weights (count, 3), even over a triangle."""
+    root, other = np.sqrt(rng.random(count)), rng.random(count)
+    return np.stack([1 - root, root * (1 - other), root * other], 1)
+
+
+def _on_small(area: NDArray, label: NDArray[np.int32], rng: np.random.Generator) -> tuple[NDArray[np.int64], NDArray]:
+    """As `_everywhere`, of points on labels that even ones hardly meet: what lies on a part is settled on its own extent."""
+    share = np.bincount(label, area)
+    small = np.flatnonzero((share > 0) & (share < OF_LABEL / POINTS * share.sum()))
+    if not len(small):
+        return np.zeros(0, np.int64), np.zeros((0, 3))
+    each = max(1, min(OF_LABEL, OF_SMALL // len(small)))
+    order = np.flatnonzero(np.isin(label, small))
+    order = order[np.argsort(label[order], kind="stable")]
+    total = np.cumsum(area[order] / share[label[order]])  # each label is 1 wide
+    u = (np.arange(each * len(small)) + rng.random(each * len(small))) / each
+    return order[np.searchsorted(total, u, side="right").clip(max=len(order) - 1)], _weights(len(u), rng)
 
 
 def _beside_edges(
@@ -256,8 +286,8 @@ def occlusion(point: Array, normal: Array, flat: Array, blocked: Blocked, rng: n
     return ((weight * hits[near]).sum(1) / np.maximum(weight.sum(1), 1) / RAYS).astype(np.float32)
 
 
-_NOTHING = np.zeros(1, np.float32)
+_NOTHING, _ZERO = np.zeros(1, np.float32), np.zeros(1, np.int32)
 EMPTY = Survey(
-    np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32), _NOTHING, _NOTHING, np.zeros(1, np.int32), WHOLE
+    np.zeros((1, 3), np.float32), np.array([[0, 0, 1]], np.float32), _NOTHING, _NOTHING, _ZERO, _ZERO, WHOLE
 )
 """Of a thing of which nothing is known."""

@@ -21,9 +21,14 @@ Row = tuple[str, str, str, str, str, str]
 
 
 def explained(recipe: Recipe) -> list[Row]:
-    """A recipe as rows under `HEADINGS`, the base first."""
-    rows = [_row(recipe.base, "everywhere")]
-    return rows + [_row(layer.coat, " and ".join(map(place, layer.masks))) for layer in recipe.layers]
+    """A recipe as rows under `HEADINGS`, the base first, then likewise its parts."""
+    rows = [_row(recipe.base, "everywhere" if not recipe.parts else "all that is no part")]
+    rows += [_row(layer.coat, " and ".join(map(place, layer.masks))) for layer in recipe.layers]
+    for part in recipe.parts:
+        base, *layers = explained(part.recipe)
+        rows.append((base[0], f"part {part.name}", *base[2:]))
+        rows += [(row[0], f"part {part.name}, {row[1]}", *row[2:]) for row in layers]
+    return rows
 
 
 def parts(recipe: Recipe) -> list[str]:

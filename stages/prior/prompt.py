@@ -3,7 +3,7 @@
 Words that a table knows mean what it says. Words that none knows are read by the prior's reader, which was trained on the
 same tables and explains other words by a dictionary, and look like the substance whose name means most nearly the same. """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -16,7 +16,7 @@ from stages.core.color import srgb_decode, srgb_encode
 from stages.material.evaluate import means
 from stages.material.library import Library
 from stages.material.look import from_oklab, to_oklab
-from stages.material.recipe import Coat, Layer, Mask, Recipe
+from stages.material.recipe import Coat, Layer, Mask, Part, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
 from stages.prior.names import FINISHES, FINISHES_METAL
@@ -80,6 +80,13 @@ def read_prompt(prompt: str, prior: Words, seed: int, metres: float | None = Non
     Args:
         metres: longest edge of the object, where it is known. library: scanned materials, which are preferred. """
     return Reading(prior, metres, library=library).recipe(prompt, seed)
+
+
+def read_parts(
+    parts: Sequence[tuple[str, str]], whole: Recipe, prior: Words, seed: int, library: Library | None = None
+) -> tuple[Part, ...]:
+    """What the words of parts call for, on a thing as large as its own recipe says. Args: parts: name and prompt of each."""
+    return tuple(Part(name, text, (), read_prompt(text, prior, seed, whole.base.metres, library)) for name, text in parts)
 
 
 class Reading:

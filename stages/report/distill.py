@@ -27,6 +27,7 @@ from stages.core.shading import KNOTS, Material, Transport, shade_reference
 from stages.distill.base import Base
 from stages.distill.guidance.sd import BUDGET, StableDiffusionGuidance, view_size
 from stages.distill.options import DistillOptions
+from stages.distill.regions import Regions
 from stages.distill.sampling import CropSampler
 from stages.distill.stage import Clock, Run, chosen_device, draw, new_state, optimisation_step
 from stages.distill.views import Views
@@ -95,7 +96,7 @@ def report_distill(conditions: Path, out: Path, options: DistillReportOptions, p
     model, size = _model(options, views, device, plan)
     sampler = CropSampler(views, size, options.batch, device)
     timed = Timed(model, device)
-    run = _run(views, StableDiffusionGuidance(timed, sampler, asked), asked, device)  # type: ignore[arg-type]
+    run = _run(views, StableDiffusionGuidance(timed, sampler, asked, Regions()), asked, device)  # type: ignore[arg-type]
     steps: list[dict[str, float]] = []
     for i in range(options.warm_up + options.steps):
         progress("measured steps", i, options.warm_up + 2 * options.steps)

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from stages.asset.parts import labels
 from stages.bake.raster import covered_samples
 from stages.bake.stage import Subject
 from stages.bake.texels import texel_size
@@ -46,12 +47,14 @@ TURNS = (0.0, 0.33, 0.67)
 
 @dataclass(frozen=True)
 class Ground:
-    """T texel centres. point, normal: (T, 3) world. footprint: (T,) edge of a texel. triangle: (T,); barycentric: (T, 3)."""
+    """T texel centres. point, normal: (T, 3) world. footprint: (T,) edge of a texel. label: (T,) of the parts. triangle: (T,);
+    barycentric: (T, 3)."""
 
     scene: Scene
     point: NDArray[np.float32]
     normal: NDArray[np.float32]
     footprint: NDArray[np.float32]
+    label: NDArray[np.int32]
     triangle: NDArray[np.int32]
     barycentric: NDArray[np.float32]
 
@@ -70,12 +73,12 @@ class Ground:
         weights = np.c_[some.barycentric, 1 - some.barycentric.sum(1)].astype(np.float32)
         width = texel_size(corners, subject.layout)[some.triangle]
         point, normal = some.interpolate(corners), some.interpolate(mesh["normals"])
-        return Ground(subject.scene, point, normal, width, some.triangle, weights)
+        return Ground(subject.scene, point, normal, width, labels(mesh)[some.triangle], some.triangle, weights)
 
     def material(self, path: Path) -> NDArray[np.float32]:
         """A material as a bake evaluates it, (T, 5) linear. Raises: ArtifactError."""
         learnt = LearntMaterial.of(path, load_npz(path, MATERIAL))
-        surface = learnt.lookup.surface(self.point, self.normal, self.footprint)
+        surface = learnt.lookup.surface(self.point, self.normal, self.footprint, self.label)
         base = np.ascontiguousarray(evaluate(learnt.recipe, surface, learnt.lookup.survey.pieces)[:, :5])
         with torch.no_grad():
             return combined(torch.from_numpy(base), learnt.residual(torch.from_numpy(self.point))).numpy()

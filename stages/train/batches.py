@@ -68,12 +68,17 @@ class Tiles:
     def __getitem__(self, index: int) -> Tile:
         shard, tile = self.shards[self.where[index][0]], self.where[index][1]
         part, shape = slice(shard["start"][tile], shard["start"][tile + 1]), shard["shape"][tile]
-        surface = Surface(*(shard[name][part] for name in SURFACE))
-        even = Surface(*(shard[f"even_{name}"][shape] for name in SURFACE))
+        surface, even = _surface(shard, "", part), _surface(shard, "even_", shape)
         pieces = Pieces(*(shard[f"pieces_{name}"][shard["pieces_shape"] == shape] for name in Pieces._fields))
         normal = surface.normal @ shard["to_view"][tile].T
         light = shard["transport"][part], shard["cosine"][part]
         return Tile(shard["mask"][tile], shard["depth"][tile], normal, surface, *light, even, pieces)
+
+
+def _surface(shard: dict[str, NDArray], prefix: str, rows: slice | NDArray) -> Surface:
+    """Stored points of a shape, which has no parts."""
+    stored = {name: shard[prefix + name][rows] for name in SURFACE}
+    return Surface(**stored, label=np.zeros(len(stored["point"]), np.int32))
 
 
 class PictureBatches(torch.utils.data.Dataset):

@@ -38,7 +38,7 @@ SHARD = Schema(
         "mask": Field("?", ("T", SIZE, SIZE)),
         "depth": Field("f4", ("T", SIZE, SIZE)),  # planar, 0 off the object
         "to_view": Field("f4", ("T", 3, 3)),  # world direction to view space
-        "point": Field("f4", ("P", 3)),  # the fields of `material.surface.Surface`, from here to the piece
+        "point": Field("f4", ("P", 3)),  # the fields of `material.surface.Surface`, from here to the piece; no labels
         "normal": Field("f4", ("P", 3)),  # world, facing the viewer
         "footprint": Field("f4", ("P",)),
         "convexity": Field("f4", ("P",)),
@@ -102,7 +102,8 @@ def render_shard(index: int, tiles: int, seed: int) -> dict[str, NDArray]:
     while len(done) < tiles:
         shape = make_shape(rng)
         scene = Scene(shape.vertices, shape.triangles, shape.normals)
-        survey = make_survey(shape.vertices, shape.triangles, shape.normals, scene.occluded, int(rng.integers(2**31)))
+        whole = np.zeros(len(shape.triangles), np.int32)
+        survey = make_survey(shape.vertices, shape.triangles, shape.normals, scene.occluded, whole, int(rng.integers(2**31)))
         known.append(Lookup(survey))
         for _ in range(2):
             c2w, fov = random_camera(shape, rng)

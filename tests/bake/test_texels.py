@@ -46,7 +46,8 @@ def single(touched: UvSurface) -> Patches:
 
 def baked(arrays: dict[str, NDArray], layout: Layout, touched: UvSurface) -> texels.Texels:
     made = LearntMaterial(EVEN, Lookup(EMPTY), small_residual())
-    return texels.Texels(made, arrays["vertices"][arrays["triangles"]], arrays["normals"], layout, touched)
+    label = np.zeros(len(arrays["triangles"]), np.int32)
+    return texels.Texels(made, arrays["vertices"][arrays["triangles"]], arrays["normals"], label, layout, touched)
 
 
 @pytest.mark.parametrize("supersample", [1, 2, 3])

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 from stages.core.shading import KNOTS, Transport
-from stages.core.views import Geometry, read_transport, write_geometry, write_transport
+from stages.core.views import Geometry, read_geometry, read_transport, write_geometry, write_transport
 
 
 def test_stored_transport_errs_by_less_than_half_a_percent(tmp_path: Path) -> None:
@@ -18,7 +18,9 @@ def test_stored_transport_errs_by_less_than_half_a_percent(tmp_path: Path) -> No
     cosine = torch.rand(count, generator=generator)
     mask = np.ones((8, 8), bool)
     (tmp_path / "view_000").mkdir()
-    write_geometry(tmp_path, 0, Geometry(mask, mask.astype(np.float32), np.zeros((8, 8, 3), np.float32)))
+    label = np.arange(64, dtype=np.int32).reshape(8, 8) + 2**24 - 64
+    write_geometry(tmp_path, 0, Geometry(mask, mask.astype(np.float32), np.zeros((8, 8, 3), np.float32), label))
+    assert np.array_equal(read_geometry(tmp_path, 0).label, label)
     write_transport(tmp_path, 0, "sky", mask, Transport(E, A, B, cosine))
     found = read_transport(tmp_path, 0, "sky", mask)
     for stored, exact in ((found.E, E), (found.A, A), (found.B, B)):

@@ -42,7 +42,23 @@ def sphere_view(c2w: NDArray, size: int) -> tuple[Geometry, NDArray, NDArray]:
     normal = np.zeros((size * size, 3), np.float32)
     normal[mask] = n @ c2w[:3, :3]
     depth = np.where(mask, t, 0).astype(np.float32).reshape(size, size)
-    return Geometry(mask.reshape(size, size), depth, normal.reshape(size, size, 3)), n, wo
+    label = np.zeros(size * size, np.int32)
+    label[mask] = label_at(origins[mask] + t[mask, None] * directions[mask])
+    return Geometry(mask.reshape(size, size), depth, normal.reshape(size, size, 3), label.reshape(size, size)), n, wo
+
+
+def label_at(point: NDArray) -> NDArray[np.int32]:
+    """The upper half of the sphere is one part, the lower another."""
+    return (point[:, 2] > 0).astype(np.int32)
+
+
+PARTS = [
+    {"number": 1, "kind": "slot", "name": "lower", "share": 0.5, "labels": [0]},
+    {"number": 2, "kind": "slot", "name": "upper", "share": 0.5, "labels": [1]},
+    {"number": 3, "kind": "slot", "name": "hair", "share": 0.0, "labels": [2]},
+    {"number": 4, "kind": "piece", "name": "", "share": 1.0, "labels": [0, 1, 2]},
+]
+"""Those of the sphere; of one nothing can be seen."""
 
 
 def gradient_light(name: str, n: NDArray, wo: NDArray) -> Transport:
@@ -85,6 +101,7 @@ def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str 
         folders = [view_folder(view), *([f"{view_folder(view)}/{SD}"] if profile == SD else [])]
         files += [f"{place}/{name}.exr" for place in folders for name in ("geometry", *LIGHTS)]
     extra = {"environments": list(LIGHTS), "views": views, "knots": list(KNOTS), "clamped": {}, "profile": profile}
+    extra |= {"parts": PARTS, "shared_labels": []}
     extra["to_world"] = [x / extent for x in identity()[:-1]] + [1.0]
     write_manifest(folder, CONDITIONS, Provenance(made.options, 0, made.inputs, extra), files)
     return folder
@@ -99,7 +116,8 @@ def sphere_survey() -> Survey:
     point, zero = np.float32(RADIUS) * normal, np.zeros(count, np.float32)
     order = np.random.default_rng(0).permutation(count)  # its first ones are evenly spread, too
     shape = survey.convexity(point, normal)
-    return Survey(point[order], normal[order], shape[order], zero, np.zeros(count, np.int32), WHOLE)
+    label = label_at(point[order])
+    return Survey(point[order], normal[order], shape[order], zero, np.zeros(count, np.int32), label, WHOLE)
 
 
 def identity() -> list[float]:

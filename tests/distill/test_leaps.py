@@ -20,7 +20,7 @@ def shaded_mirrors() -> Sample:
     A = level * (1e-4 + (knots - 0.25).clamp(min=0))[None, :, None]
     transport = Transport(torch.rand(rows, 3, generator=g) + 0.3, A, 0.02 * A, torch.rand(rows, generator=g) * 0.8 + 0.2)
     zeros = torch.zeros(POINTS, 3)
-    return Sample(zeros, zeros, zeros[:, 0], LIGHTS, transport, rows=torch.arange(POINTS))
+    return Sample(zeros, zeros, zeros[:, 0], zeros[:, 0].long(), LIGHTS, transport, rows=torch.arange(POINTS))
 
 
 class Ask:

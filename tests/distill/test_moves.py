@@ -24,8 +24,8 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
 
 
 def values_at(base: Base, views: Views) -> tuple[torch.Tensor, torch.Tensor]:
-    points, normals = random_points(views, views.seen, 1500, torch.Generator().manual_seed(0))
-    return base.at(points, normals, torch.full((len(points),), views.pixel_size()))
+    points, normals, label = random_points(views, views.seen, 1500, torch.Generator().manual_seed(0))
+    return base.at(points, normals, torch.full((len(points),), views.pixel_size()), label)
 
 
 def test_nothing_moves_before_the_first_step(views: Views) -> None:

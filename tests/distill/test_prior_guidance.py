@@ -1,5 +1,6 @@
 """Guidance by a diffusion model, with a model whose answer is known: it wants every picture to be one flat colour."""
 
+import dataclasses
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,6 +13,8 @@ from torch import Tensor
 from stages.core.shading import Material, shade
 from stages.distill.guidance.prior import PriorGuidance
 from stages.distill.options import DistillOptions, ScoreOptions
+from stages.distill.parts import Claim
+from stages.distill.regions import Regions
 from stages.distill.sampling import CropSampler
 from stages.distill.views import Views
 from stages.material.recipe import EVEN
@@ -58,7 +61,7 @@ def views(tmp_path_factory: pytest.TempPathFactory) -> Views:
 def guidance(views: Views, colour: float, batch: int = 2, **score: Any) -> PriorGuidance:
     chosen = DistillOptions(prompt="flat", batch=batch, score=ScoreOptions(negative_prompt="bad", **score))
     sampler = CropSampler(views, SIZE, batch, torch.device("cpu"))
-    return PriorGuidance(FlatPrior(colour), sampler, chosen, lambda: EVEN)  # type: ignore[arg-type]
+    return PriorGuidance(FlatPrior(colour), sampler, chosen, lambda: EVEN, Regions())  # type: ignore[arg-type]
 
 
 def shown(made: PriorGuidance, seed: int = 0) -> tuple[Any, Tensor, torch.Generator]:
@@ -131,3 +134,37 @@ def test_conditions_files_are_enough(views: Views, tmp_path: Path) -> None:
     toned = profile.tone(float(exposure) * shade(sample.transport, white))
     lit = conditions[0, 4 + 6 : 4 + 9].flatten(1)[:, sample.images.pixel].T  # metallic 0, roughness 1
     torch.testing.assert_close(lit, toned, rtol=1e-3, atol=1e-4)
+
+
+class TwoPrior(FlatPrior):
+    """Wants pictures of `colour` for the prompt "flat", of minus that for any other."""
+
+    def embed(self, prompts: list[str]) -> TextEmbedding:
+        kind = [0.0 if p == "" else 2.0 if p == "bad" else 1.0 if p.startswith("flat") else -1.0 for p in prompts]
+        tokens = torch.tensor(kind)[:, None, None]
+        return TextEmbedding(tokens, torch.ones(len(prompts), 1, dtype=torch.bool), tokens[:, 0])
+
+    def denoise(self, x_t: Tensor, t: Tensor, conditions: Tensor, text: TextEmbedding) -> tuple[Tensor, Tensor]:
+        self.calls.append((t, conditions))
+        a, sign = self.alpha_bar[t][:, None, None, None], text.pooled[:, :, None, None]
+        wanted = (x_t - a.sqrt() * sign * self.colour) / (1 - a).sqrt()
+        return torch.where(sign.abs() == 1.0, wanted, torch.zeros_like(wanted)), x_t
+
+
+def test_each_pixel_follows_its_own_parts_prompt(views: Views) -> None:
+    """Above the gradient is that of a run with the part's prompt alone, below that of the whole's, bit for bit."""
+    options = DistillOptions(prompt="flat", batch=2, score=ScoreOptions(negative_prompt="bad", eta1=1.0))
+
+    def gradient(prompt: str, *claims: Claim) -> tuple[Any, Tensor, int]:
+        sampler = CropSampler(views, SIZE, 2, torch.device("cpu"))
+        asked, model = dataclasses.replace(options, prompt=prompt), TwoPrior(3.0)
+        made = PriorGuidance(model, sampler, asked, lambda: EVEN, Regions(claims))  # type: ignore[arg-type]
+        sample, radiance, generator = shown(made, 3)
+        return sample, made.respond(radiance, sample, 0.1, generator).gradient, len(model.calls)
+
+    sample, mixed, calls = gradient("flat", Claim(0, "upper", "other", (1,)))
+    upper = sample.label == 1
+    assert 0 < int(upper.sum()) < len(upper) and calls == 1
+    for prompt, mine in (("other", upper), ("flat", ~upper)):
+        assert torch.equal(mixed[mine], gradient(prompt)[1][mine])
+        assert not torch.equal(mixed[~mine], gradient(prompt)[1][~mine])

@@ -24,6 +24,8 @@ from stages.distill.guidance import sd
 from stages.distill.guidance.sd import StableDiffusionGuidance
 from stages.distill.guidance.view_words import VIEW_WORDS, words_of
 from stages.distill.options import DistillOptions, ScoreOptions
+from stages.distill.parts import Claim
+from stages.distill.regions import Regions, regional
 from stages.distill.sampling import CropSampler, Sample
 from stages.distill.stage import distill
 from stages.distill.views import Views
@@ -37,6 +39,7 @@ from tests.sd import tiny
 
 CPU = torch.device("cpu")
 SIZE = 24
+LATENTS = 3
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +66,7 @@ def sources(folder: Path, **changes: Any) -> SdOptions:
 def guidance(model: StableDiffusion, views: Views, batch: int = 2, **options: Any) -> StableDiffusionGuidance:
     score = ScoreOptions(negative_prompt="bad", loss=options.pop("loss", "csd"), given=options.pop("given", "full"))
     chosen = DistillOptions(guidance="sd", prompt="oak", batch=batch, score=score, **options)
-    return StableDiffusionGuidance(model, CropSampler(views, sd.view_size(views, model.files), batch, CPU), chosen)
+    return StableDiffusionGuidance(model, CropSampler(views, sd.view_size(views, model.files), batch, CPU), chosen, Regions())
 
 
 def shown(made: StableDiffusionGuidance, seed: int = 0) -> tuple[Sample, Tensor]:
@@ -272,3 +275,33 @@ def test_command_line_with_a_model_in_the_hubs_cache(folder: Path, tmp_path: Pat
     assert load_npz(out, MATERIAL).provenance.extra["guidance"]["sd_model"] == "sd"
     again = dreammat(*common, "--sd-model", folder / "sd", "--controlnet", folder / "controlnet", **offline)
     assert "up to date" in again.stdout, again.stderr
+
+
+def test_the_gradient_of_a_parts_pixels_depends_on_its_own_prompt(model: StableDiffusion, views: Views) -> None:
+    """Another prompt for the upper half changes what is predicted of the latents that show it, and of no others."""
+    sampler = CropSampler(views, sd.view_size(views, model.files), 2, CPU)
+    sample = sampler.draw(torch.Generator().manual_seed(0))
+    images = sample.images
+    assert images is not None
+
+    def asked(upper: str) -> tuple[Tensor, Tensor, Tensor]:
+        regions = Regions([Claim(0, "upper", upper, (1,))])
+        made = StableDiffusionGuidance(model, sampler, DistillOptions(guidance="sd", prompt="oak", batch=2), regions)
+        areas = regions.areas(images, sample, LATENTS)
+
+        def noise(x_t: Tensor, t: Tensor, prompts: list[int], others: int) -> Tensor:
+            return model.predict_noise(x_t, t, made._branches(images, prompts, others), None, 1.0)
+
+        x_t = torch.randn((2, 4, LATENTS, LATENTS), generator=torch.Generator().manual_seed(1))
+        predicted = regional(noise, areas)(x_t.repeat(3, 1, 1, 1), torch.tensor([300, 500] * 3), 3)
+        _, radiance = shown(made)
+        return predicted, areas.weights[1], made.respond(radiance, sample, 0.0, torch.Generator().manual_seed(1)).gradient
+
+    (steel, weight, gradient), (gold, _, other) = asked("steel"), asked("gold")
+    shows = (weight > 0).expand(-1, steel.shape[1], -1, -1)
+    changed = steel[:2] != gold[:2]
+    assert 0.1 < float(shows.float().mean()) < 0.9
+    assert not changed[~shows].any() and changed[shows].float().mean() > 0.99
+    assert torch.equal(steel[2:], gold[2:])  # no prompt, and the negative one
+    upper = sample.label == 1
+    assert (gradient - other)[upper].abs().mean() > 0.01 * gradient[upper].abs().mean()

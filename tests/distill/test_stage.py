@@ -28,7 +28,7 @@ from stages.material.evaluate import evaluate
 from stages.material.learnt import LearntMaterial
 from stages.material.residual import combined
 from tests.conftest import Golden
-from tests.distill.examples import painted_sphere, write_conditions
+from tests.distill.examples import label_at, painted_sphere, write_conditions
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,7 @@ def learnt_at(path: Path, points: torch.Tensor) -> Material:
     """The material of points (P, 3) by material.npz, the normals of a sphere's."""
     learnt = LearntMaterial.of(path, load_npz(path, MATERIAL))
     normals, footprint = torch.nn.functional.normalize(points), np.full(len(points), 1e-3, "f4")
-    surface = learnt.lookup.surface(points.numpy(), normals.numpy(), footprint)
+    surface = learnt.lookup.surface(points.numpy(), normals.numpy(), footprint, label_at(points.numpy()))
     base = torch.from_numpy(evaluate(learnt.recipe, surface)[:, :5])
     return Material.of(combined(base, learnt.residual(points)))
 

@@ -33,12 +33,12 @@ def gilded(*masks: Mask) -> Recipe:
 
 def metallic_at(recipe: Recipe, views: Views) -> tuple[torch.Tensor, torch.Tensor]:
     """Points, and how much metal lies there."""
-    points, normals = random_points(views, views.seen, 2000, seeded(3))
-    return points, Base(recipe, views).at(points, normals, torch.full((len(points),), views.pixel_size()))[0][:, 4]
+    points, normals, label = random_points(views, views.seen, 2000, seeded(3))
+    return points, Base(recipe, views).at(points, normals, torch.full((len(points),), views.pixel_size()), label)[0][:, 4]
 
 
 def test_points_are_those_of_the_views(views: Views) -> None:
-    points, normals = random_points(views, views.seen, 500, seeded())
+    points, normals, _ = random_points(views, views.seen, 500, seeded())
     assert len(points) >= 500
     torch.testing.assert_close(points, normals * 0.5, rtol=0, atol=2e-3)  # a sphere of diameter 1
 
@@ -57,23 +57,24 @@ def test_what_lies_on_top_does(views: Views) -> None:
 
 def test_a_base_is_a_function_of_the_place(views: Views) -> None:
     base = Base(gilded(Mask("spots", 0.3)), views)
-    points, normals = random_points(views, views.seen, 100, seeded())
+    points, normals, label = random_points(views, views.seen, 100, seeded())
     footprint = torch.full((len(points),), views.pixel_size())
     order = torch.randperm(len(points), generator=seeded())
-    found, shuffled = base.at(points, normals, footprint), base.at(points[order], normals[order], footprint)
+    where = (points, normals, footprint, label)
+    found, shuffled = base.at(*where), base.at(*(t[order] for t in where))
     assert all(torch.equal(mixed, values[order]) for mixed, values in zip(shuffled, found, strict=True))
 
 
 def test_of_several_draws_the_one_least_like_light_is_taken(views: Views) -> None:
     """It is one of the best of its set by other points too."""
-    points, normals = random_points(views, views.seen, 16_000, seeded(5))
+    points, normals, label = random_points(views, views.seen, 16_000, seeded(5))
     even = spread_evenly(points, 4000, views, seeded(6))
-    points, normals = points[even], normals[even]
+    points, normals, label = points[even], normals[even], label[even]
     light = sum((0.6 + normals.numpy() @ towards[:, None] / 3) * colour for towards, colour in LIGHTS.values())
     footprint = torch.full((len(points),), views.pixel_size())
 
     def likeness(recipe: Recipe) -> float:
-        return abs(log_correlation(Base(recipe, views).at(points, normals, footprint)[0][:, :3].numpy(), light))
+        return abs(log_correlation(Base(recipe, views).at(points, normals, footprint, label)[0][:, :3].numpy(), light))
 
     cloudy = Recipe(Coat("rust", metres=0.3))
     chosen = least_like_light(cloudy, views, seeded())

@@ -29,7 +29,8 @@ def cube() -> Lookup:
     flat = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     flat /= np.linalg.norm(flat, axis=1, keepdims=True)
     normals = np.repeat(flat[:, None], 3, 1).astype(np.float32)
-    return Lookup(make_survey(corners, triangles, normals, lambda origin, direction: np.zeros(len(origin), bool)))
+    label = np.zeros(len(triangles), np.int32)
+    return Lookup(make_survey(corners, triangles, normals, lambda origin, direction: np.zeros(len(origin), bool), label))
 
 
 def metal(mask: Mask, count: int, extent: float, corner: tuple[float, float] = (-0.5, -0.5)) -> NDArray[np.float32]:

@@ -47,7 +47,7 @@ def surface(*pieces: tuple[np.ndarray, np.ndarray], apart: bool = False) -> Surf
     normal = np.concatenate([n for _, n in pieces]).astype(np.float32)
     number = np.concatenate([np.full(len(p), k if apart else 0, np.int32) for k, (p, _) in enumerate(pieces, 1)])
     zero = np.zeros(len(point), np.float32)
-    return Surface(point, normal, zero + np.float32(1e-3), zero, zero, number)
+    return Surface(point, normal, zero + np.float32(1e-3), zero, zero, number, 0 * number)
 
 
 LEGS = [box((x, y, -0.5), (x + 0.04, y + 0.04, 0.2)) for x in (-0.3, 0.26) for y in (-0.3, 0.26)]
@@ -86,7 +86,7 @@ def test_handles_of_long_things_are_found_however_they_lie(thing: list, handle_b
     one = surface(*thing)
     handle = one.point[:, 2] < handle_below
     turned = Surface(one.point @ turn.T.astype(np.float32), one.normal @ turn.T.astype(np.float32), one.footprint,
-                     one.convexity, one.occlusion, one.piece)  # fmt: skip
+                     one.convexity, one.occlusion, one.piece, one.label)  # fmt: skip
     assert ((covered(turned, "handle") > 0.5) == handle).mean() > 0.93
     other = covered(turned, "blade" if thing is SWORD else "head", region="above") > 0.5
     assert (other != handle).mean() > 0.93

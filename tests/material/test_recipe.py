@@ -158,7 +158,8 @@ def test_a_survey_finds_edges_creases_and_what_is_hidden() -> None:
     flat = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     flat /= np.linalg.norm(flat, axis=1, keepdims=True)
     normals = np.repeat(flat[:, None], 3, 1).astype(np.float32)
-    found = make_survey(corners, triangles, normals, lambda origin, direction: origin[:, 2] < 0)
+    label = np.zeros(len(triangles), np.int32)
+    found = make_survey(corners, triangles, normals, lambda origin, direction: origin[:, 2] < 0, label)
     near = np.sort(abs(abs(found.point) - 0.5), axis=1)[:, 1]  # distance to the nearest edge
     assert found.convexity[near < 0.003].mean() > 0.2 > 0.03 > abs(found.convexity[near > 0.05]).max()
     low = found.point[:, 2] < -0.05
@@ -182,7 +183,7 @@ def test_points_that_search_together_are_told_what_each_alone_is() -> None:
         at, normal = rng.random((count, 3)).astype(np.float32), rng.normal(size=(count, 3)).astype(np.float32)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         values = rng.random((2, count)).astype(np.float32)
-        lookup = Lookup(Survey(at, normal, values[0], values[1], np.zeros(count, np.int32), WHOLE))
+        lookup = Lookup(Survey(at, normal, values[0], values[1], *[np.zeros(count, np.int32)] * 2, WHOLE))
         first = rng.random((50, 3)).astype(np.float32)
         group = np.repeat(np.arange(50), 20)
         point = first[group] + rng.uniform(-1, 1, (1000, 3)).astype(np.float32) * np.float32(2e-3)

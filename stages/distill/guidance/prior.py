@@ -19,6 +19,7 @@ from stages.distill.guidance.base import Budget, Response
 from stages.distill.guidance.csd import Weights, chosen_weights, distillation_score
 from stages.distill.guidance.view_words import VIEW_WORDS, words_of
 from stages.distill.options import DistillOptions
+from stages.distill.regions import Areas, Regions, regional
 from stages.distill.sampling import CropSampler, Images, Sample
 from stages.material.recipe import Recipe
 from stages.prior.model import Prior
@@ -36,23 +37,28 @@ albedo."""
 
 @dataclass(frozen=True)
 class Given:
-    """What the model is told of a sample: exposure (B, 1, 1, 1), condition channels (B, 23, S, S)."""
+    """What the model is told of a sample: exposure (B, 1, 1, 1), condition channels (B, 23, S, S), and which prompts."""
 
     exposure: Tensor
     conditions: Tensor
+    areas: Areas
 
 
 class PriorGuidance:
-    """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size; begin: finds what the words call for."""
+    """See `Guidance`. Args: prior: a loaded model; sampler: of crops of its size; begin: finds what the words call for;
+    regions: parts that have prompts of their own."""
 
-    def __init__(self, prior: Prior, sampler: CropSampler, options: DistillOptions, begin: Callable[[], Recipe]) -> None:
+    def __init__(
+        self, prior: Prior, sampler: CropSampler, options: DistillOptions, begin: Callable[[], Recipe], regions: Regions
+    ) -> None:
         self.sampler, self._begin = sampler, begin
         self.identity: dict[str, Any] = prior.identity
         self.held = True
         self.inputs = {"prior": prior.identity["weights"]}
         self.budget, self.weights = BUDGET, chosen_weights(options, OWN)
         self._prior, self._options = prior, options
-        self._positive = {words: prior.embed([f"{options.prompt}, {words}"]) for words in VIEW_WORDS}
+        self._regions, prompts = regions, [options.prompt, *regions.prompts]
+        self._positive = [{words: prior.embed([f"{prompt}, {words}"]) for words in VIEW_WORDS} for prompt in prompts]
         self._null, self._negative = prior.embed([""]), prior.embed([options.score.negative_prompt])
 
     @functools.cached_property
@@ -67,7 +73,8 @@ class PriorGuidance:
         exposure, conditions = self._conditions(sample.images, sample)
         if given != "full":
             conditions = self._prior.drop(conditions, geometry=given != "geometry", light=given != "light")
-        return dataclasses.replace(sample, given=Given(exposure, conditions))
+        areas = self._regions.areas(sample.images, sample, sample.images.size)
+        return dataclasses.replace(sample, given=Given(exposure, conditions, areas))
 
     def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
         """See `Guidance.respond`; the number for the curve is the root mean square of the score on the picture."""
@@ -76,9 +83,11 @@ class PriorGuidance:
         leaf = radiance.detach().requires_grad_()
         picture = prior.profile_tone(given.exposure * images.paint(leaf))  # (B, 3, S, S)
 
-        def predict(x_t: Tensor, t: Tensor, branches: int) -> Tensor:
-            return prior.denoise(x_t, t, given.conditions.repeat(branches, 1, 1, 1), self._text(images, branches))[0]
+        def noise(x_t: Tensor, t: Tensor, prompts: list[int], others: int) -> Tensor:
+            conditions = given.conditions.repeat(len(prompts) + others, 1, 1, 1)
+            return prior.denoise(x_t, t, conditions, self._text(images, prompts, others))[0]
 
+        predict = regional(noise, given.areas)
         score = distillation_score(predict, picture.detach(), prior.alpha_bar, self.weights, progress, generator)
         (gradient,) = torch.autograd.grad((picture * score).sum() / len(radiance), leaf)
         on_object = images.paint(torch.ones_like(radiance[:, :1]))
@@ -94,8 +103,8 @@ class PriorGuidance:
         height = images.paint(images.surface.points[:, 2:])
         return exposure, self._prior.prepare(depth, normal, height, mask, exposure * lights)
 
-    def _text(self, images: Images, branches: int) -> TextEmbedding:
-        """Prompt with view words, no prompt, and negative prompt, for B images each; the first `branches` of them."""
-        positive = [self._positive[words] for words in words_of(images)]
-        rest = [self._null, self._negative][: branches - 1]
+    def _text(self, images: Images, prompts: list[int], others: int) -> TextEmbedding:
+        """Prompts with view words, then no prompt and the negative one, or fewer of these, for B images each."""
+        positive = [self._positive[prompt][words] for prompt in prompts for words in words_of(images)]
+        rest = [self._null, self._negative][:others]
         return TextEmbedding.cat([*positive, *(text.expand(images.count) for text in rest)])

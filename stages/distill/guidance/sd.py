@@ -21,6 +21,7 @@ from stages.distill.guidance.base import Budget, Response
 from stages.distill.guidance.csd import CSD, chosen_weights, distillation_score
 from stages.distill.guidance.view_words import VIEW_WORDS, words_of
 from stages.distill.options import DistillOptions
+from stages.distill.regions import Regions, regional
 from stages.distill.sampling import CropSampler, Images, Sample
 from stages.distill.views import Views
 from stages.material.recipe import EVEN
@@ -44,17 +45,18 @@ def view_size(views: Views, files: ModelFiles) -> int:
 
 
 class StableDiffusionGuidance:
-    """See `Guidance`. Args: model: loaded; sampler: of crops of `view_size`."""
+    """See `Guidance`. Args: model: loaded; sampler: of crops of `view_size`; regions: parts that have prompts of their own."""
 
-    def __init__(self, model: StableDiffusion, sampler: CropSampler, options: DistillOptions) -> None:
+    def __init__(self, model: StableDiffusion, sampler: CropSampler, options: DistillOptions, regions: Regions) -> None:
         self.sampler = sampler
         self.identity: dict[str, Any] = model.identity
         self.inputs: dict[str, str] = model.hashes
         self.recipe, self.held = EVEN, False
         self.budget, self.weights = BUDGET, chosen_weights(options, CSD)
         self._model, self._given = model, options.score.given
-        prompts = [f"{options.prompt}, {words}" for words in VIEW_WORDS]
-        self._text = model.embed([*prompts, "", options.score.negative_prompt])  # (6, T, D)
+        self._regions = regions
+        prompts = [f"{prompt}, {words}" for prompt in (options.prompt, *regions.prompts) for words in VIEW_WORDS]
+        self._text = model.embed(["", options.score.negative_prompt, *prompts])  # (2 + 4 K, T, D) of K prompts
 
     def draw(self, generator: torch.Generator) -> Sample:
         """See `Guidance.draw`."""
@@ -69,10 +71,12 @@ class StableDiffusionGuidance:
         leaf = radiance.detach().requires_grad_()
         latents = model.encode(profile.picture(images.paint(leaf), mask))
 
-        def predict(x_t: Tensor, t: Tensor, branches: int) -> Tensor:
-            given = None if conditions is None else conditions.repeat(branches, 1, 1, 1)
-            return model.predict_noise(x_t, t, self._branches(images, branches), given, schedule.control_scale(progress))
+        def noise(x_t: Tensor, t: Tensor, prompts: list[int], others: int) -> Tensor:
+            given = None if conditions is None else conditions.repeat(len(prompts) + others, 1, 1, 1)
+            text = self._branches(images, prompts, others)
+            return model.predict_noise(x_t, t, text, given, schedule.control_scale(progress))
 
+        predict = regional(noise, self._regions.areas(images, sample, latents.shape[-1]))
         score = distillation_score(predict, latents.detach(), model.alpha_bar, self.weights, progress, generator)
         (gradient,) = torch.autograd.grad(latents, leaf, score)
         return Response(gradient / len(radiance), float(score.square().mean().sqrt()))
@@ -90,10 +94,9 @@ class StableDiffusionGuidance:
         conditions = profile.prepare(depth, normal, mask, lights)
         return profile.without(conditions, geometry=self._given == "light", light=self._given == "geometry")
 
-    def _branches(self, images: Images, branches: int) -> Tensor:
-        """Text (N B, T, D): prompt with view words, no prompt, and negative prompt, for B images each; the first N."""
-        null, negative = len(VIEW_WORDS), len(VIEW_WORDS) + 1
-        rows = [VIEW_WORDS.index(words) for words in words_of(images)]
-        rows += [null] * images.count + [negative] * images.count
-        chosen = torch.tensor(rows[: branches * images.count]).to(self._text.device, non_blocking=True)
-        return self._text[chosen]
+    def _branches(self, images: Images, prompts: list[int], others: int) -> Tensor:
+        """Text (N B, T, D): prompts with view words, then no prompt and the negative one, or fewer, for B images each."""
+        null, negative, first, views = 0, 1, 2, len(VIEW_WORDS)
+        rows = [first + views * prompt + VIEW_WORDS.index(words) for prompt in prompts for words in words_of(images)]
+        rows += [row for row in (null, negative)[:others] for _ in range(images.count)]
+        return self._text[torch.tensor(rows).to(self._text.device, non_blocking=True)]
