@@ -17,7 +17,7 @@ DEFAULT = defaults(BakeOptions)
 @click.option("--size", type=click.Choice(SIZES), default=DEFAULT["size"], show_default=True, metavar="TEXELS",
               help=f"Texture size: {', '.join(map(str, SIZES))}.")
 @click.option("--supersample", type=click.IntRange(1, 8), default=DEFAULT["supersample"], show_default=True,
-              metavar="N", help="N x N samples in each texel.")
+              metavar="N", help="N x N samples in texels that borders run through; one in others.")
 @click.option("--relief", type=click.FloatRange(0, 2), default=DEFAULT["relief"], show_default=True, metavar="X",
               help="How strongly the material's relief is shown, as a multiple; 0 writes no normal and height maps of it.")
 @library_option

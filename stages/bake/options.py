@@ -14,7 +14,7 @@ class BakeOptions:
     """How textures are baked."""
 
     size: int = 2048  # texels along each edge, one of SIZES
-    supersample: int = 1  # samples along each edge of a texel, averaged; a recipe holds nothing finer than one asks for
+    supersample: int = 2  # samples along the edge of a texel that differs from its neighbours, averaged; of others one
     preview_size: int = 320  # pixels along each edge of one view of preview.png
     occlusion_rays: int = 128  # of each point whose ambient occlusion is traced
     relief: float = 1.0  # how strongly what stands out of the surface is shown, as a multiple; 0 none

@@ -4,11 +4,13 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from stages.material.evaluate import COLUMNS, layered
 from stages.material.place import Place
 from stages.material.recipe import Recipe
 from stages.material.surface import Array, Surface
+from stages.material.uneven import uneven
 
 SAMPLES = 1 << 15
 """Evaluated together: what they need stays in a core's cache."""
@@ -27,23 +29,33 @@ def swatch(recipe: Recipe, size: int, threads: int, supersample: int = 2) -> Swa
     """A square of a material that tiles, seen from above: its rows run down, its left edge continues at its right.
 
     Args:
-        recipe: settled. size: texels along an edge. supersample: samples along the edge of a texel, averaged.
+        recipe: settled. size: texels along an edge. supersample: samples along the edge of a texel where texels differ much
+        from their neighbours (`uneven`), averaged; of others there is one.
     """
-    count = size * supersample
-    across = (np.arange(count, dtype=np.float32) + np.float32(0.5)) / np.float32(count)
-    maps = np.empty((size, size, COLUMNS), np.float32)
-    rows = max(1, SAMPLES // (count * supersample))
+    maps = np.empty((size * size, COLUMNS), np.float32)
 
-    def band(first: int) -> None:
-        some = across[first * supersample : (first + rows) * supersample]
-        v, u = (a.ravel() for a in np.meshgrid(1 - some, across, indexing="ij"))
-        point = np.stack([u, v, np.zeros_like(u)], 1)
-        surface = Surface.bare(point, np.broadcast_to(np.array([0, 0, 1], np.float32), point.shape), 1 / count)
-        p = np.ascontiguousarray(point.T)
-        world = Place(p, p[:2], np.zeros(len(u), np.int32), surface.footprint, (1.0, 1.0, 0.0), recipe.seed)
-        values, _ = layered(recipe, surface, world)
-        maps[first : first + rows] = values.reshape(-1, supersample, size, supersample, COLUMNS).mean((1, 3))
+    def part(texels: NDArray[np.int64], samples: int) -> None:
+        maps[texels] = _sampled(recipe, size, texels, samples)
 
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(band, range(0, size, rows)))
-    return Swatch(maps[..., :3], maps[..., 3], maps[..., 4], maps[..., 5])
+        list(pool.map(lambda start: part(np.arange(start, min(start + SAMPLES, len(maps))), 1), range(0, len(maps), SAMPLES)))
+        if supersample > 1:
+            known = np.ones((size, size), np.bool_)
+            some = np.flatnonzero(uneven(maps.reshape(size, size, COLUMNS), known, wrap=True))
+            count = SAMPLES // supersample**2
+            list(pool.map(lambda k: part(some[k : k + count], supersample), range(0, len(some), count)))
+    albedo, rest = maps[:, :3].reshape(size, size, 3), maps[:, 3:].reshape(size, size, COLUMNS - 3)
+    return Swatch(albedo, rest[..., 0], rest[..., 1], rest[..., 2])
+
+
+def _sampled(recipe: Recipe, size: int, texels: NDArray[np.int64], samples: int) -> Array:
+    """The material of some texels, (N, 6), each the mean of samples² points. Args: texels: row * size + column."""
+    inside = (np.arange(samples, dtype=np.float32) + np.float32(0.5)) / np.float32(samples)
+    row, column = (k.astype(np.float32)[:, None, None] for k in divmod(texels, size))
+    v, u = np.broadcast_arrays(1 - (row + inside[:, None]) / np.float32(size), (column + inside) / np.float32(size))
+    point = np.stack([u.ravel(), v.ravel(), np.zeros(u.size, np.float32)], 1)
+    up = np.broadcast_to(np.array([0, 0, 1], np.float32), point.shape)
+    surface = Surface.bare(point, up, 1 / (size * samples))
+    p = np.ascontiguousarray(point.T)
+    world = Place(p, p[:2], np.zeros(len(point), np.int32), surface.footprint, (1.0, 1.0, 0.0), recipe.seed)
+    return layered(recipe, surface, world)[0].reshape(len(texels), samples**2, COLUMNS).mean(1)
