@@ -160,7 +160,7 @@ def _draw(look: Look, light: Environment, directions: NDArray, c2w: NDArray, ste
         values = look.material(points, across)
         alpha[mask], material[mask] = 1, values
         values[:, 3] = rougher(values[:, 3], spread)
-        color[mask] = reflected(look.scene, points, light, values, RAYS, seed=0)
+        color[mask] = reflected(look.scene, points, [light], values, RAYS, seed=0)[0]
         if look.scene.emission is not None:
             color[mask] += look.scene.emission.at(points.triangle, points.barycentric, across)
         color *= np.float32(EXPOSURE)

@@ -58,22 +58,31 @@ def known(roughness: NDArray[np.float32], cosine: NDArray[np.float32]) -> Known:
 
 
 def reflected(
-    scene: Scene, points: GBuffer, light: Environment, material: NDArray[np.float32], quality: Quality, seed: int
+    scene: Scene,
+    points: GBuffer,
+    environments: list[Environment],
+    material: NDArray[np.float32],
+    quality: Quality,
+    seed: int,
 ) -> NDArray[np.float32]:
-    """Outgoing radiance of every point of a view, (P, 3) linear.
+    """Outgoing radiance of every point of a view under each environment, (lights, P, 3) linear.
 
     Args:
-        material: (P, 5) albedo, roughness, metallic. quality: without further rays.
+        environments: `stages.light.light_set.MAX_LIGHTS` at most. material: (P, 5) albedo, roughness, metallic. quality:
+        without further rays.
     """
     assert not quality.extra, "rays are added where a view is noisy under lights of all materials"
     terms = known(material[:, 3], (points.n * points.wo).sum(-1).clip(0, 1))
-    lights = cached_light_set((light,))
-    sums = trace(scene, points, lights, quality, seed, terms).of_lights(1)
+    lights = cached_light_set(tuple(environments))
+    sums = trace(scene, points, lights, quality, seed, terms).of_lights(len(environments))
     if quality.smooth:
         sums.variance[terms.own < SHARP, 1:] = 0
         sums = replace(sums, mean=smoothed(sums, points, lights, reconstruction.Neighbours.of(points), terms))
-    E, A_mirror, A, B_mirror, B = sums.mean.swapaxes(0, 1)
-    rough = np.minimum(material[:, 3:4] / np.float32(SMOOTHEST), 1)
-    A, B = A_mirror + (A - A_mirror) * rough, B_mirror + (B - B_mirror) * rough
     c, m = material[:, :3], material[:, 4:5]
-    return (1 - m) * c * E + (np.float32(F0) * (1 - m) + m * c) * A + B
+    rough = np.minimum(material[:, 3:4] / np.float32(SMOOTHEST), 1)
+    under = []
+    for light in range(len(environments)):
+        E, A_mirror, A, B_mirror, B = sums.mean[:, :, 3 * light : 3 * light + 3].swapaxes(0, 1)
+        A, B = A_mirror + (A - A_mirror) * rough, B_mirror + (B - B_mirror) * rough
+        under.append((1 - m) * c * E + (np.float32(F0) * (1 - m) + m * c) * A + B)
+    return np.stack(under)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.asset.maps import Maps
-from stages.asset.textures import to_8bit, write_textures
+from stages.asset.textures import PNG_LEVEL, to_8bit, write_textures
 from stages.core.artifact import Provenance, Schema, peek, plain_options, read_manifest, run_log, write_manifest
 from stages.core.images import write_png
 from stages.core.parallel import cores
@@ -62,7 +62,7 @@ def make_swatch(out: Path, options: SwatchOptions, force: bool = False, progress
         progress("files", 0, 1)
         out.mkdir(parents=True, exist_ok=True)
         files = [*write_textures(out, maps, grey=True), "height.png", "preview.png"]
-        write_png(out / "height.png", height_8bit(maps))
+        write_png(out / "height.png", height_8bit(maps), PNG_LEVEL)
         progress("preview", 0, 1)
         write_png(out / "preview.png", preview(maps, options.preview_size))
         progress("preview", 1, 1)

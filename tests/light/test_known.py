@@ -20,7 +20,7 @@ def test_it_is_what_the_transport_gives(metallic: float) -> None:
     values = np.full((len(points.n), 5), 0.6, np.float32)
     values[:, 3] = np.array([0.0, 0.08, 0.25, 0.5, 1.0])[np.arange(len(values)) % 5]
     values[:, 4] = metallic
-    found = reflected(scene, points, light, values, MANY, 1)
+    found = reflected(scene, points, [light], values, MANY, 1)[0]
     wanted = shade(light_transport(scene, points, [light], MANY, 2)[0], Material.of(torch.from_numpy(values))).numpy()
     difference = found / (1 + found) - wanted / (1 + wanted)
     assert abs(difference.mean()) < 1e-3
@@ -33,7 +33,7 @@ def test_an_even_light_comes_out_exact() -> None:
     values = np.full((4, 5), 1.0, np.float32)
     values[:, 3] = (0.03, 0.2, 0.43, 0.9)
     quality = Quality(8, 4, extra=False, smooth=False)
-    found = reflected(scenes.sphere(1), points, scenes.even_light(), values, quality, 0)
+    found = reflected(scenes.sphere(1), points, [scenes.even_light()], values, quality, 0)[0]
     wanted = shade(
         light_transport(scenes.sphere(1), points, [scenes.even_light()], quality, 0)[0], Material.of(torch.from_numpy(values))
     )
