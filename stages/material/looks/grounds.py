@@ -205,26 +205,22 @@ def leaves(at: Place) -> Look:
 
 
 def snow(at: Place) -> Look:
-    """Settled snow: soft drifts, a crust of grains, a sparkle here and there, blue in the hollows."""
+    """Settled snow: soft drifts, a crust of grains, small pits where it sank, a twig, blue in the hollows."""
     drift = fbm(at, Spectrum(0.5, 0.02, 0.55, (1.5, 1, 1)), 1)
     crust = fbm(warped(at, 0.004, 0.03, 2), Spectrum(0.03, 0.001, 0.9, tails=0.3, skew=0.15, patch=0.4), 3)
-    grain = fbm(at, Spectrum(0.006, 0.0003, 1.12, tails=0.5, skew=-0.2, patch=0.4), 4)
-    crystal = cells(at, 0.0016, 5)
-    spark = (crystal.random(1) < 0.02) * (crystal.near < 0.0005) * fading(0.0016, at.footprint)
-    hollow = np.clip(-0.5 * drift - 0.25 * crust, -1, 1)
-    trodden = masked(warped(at, 0.01, 0.06, 6, 3), Spectrum(0.11, 0.002, 0.62, (1, 1.6, 1), 0.3, patch=0.5), 0.03, 7, 0.5)
-    color = palette(0.60 - 0.30 * hollow + 0.06 * crust, "#c3cfdd", "#d9e0e8", "#e8ebee", "#f3f4f4")
-    color = shade(color, 0.045 * grain + 0.02 * crust + 0.08 * spark - 0.10 * trodden)
+    grain = fbm(at, Spectrum(0.006, 0.0003, 1.1, tails=0.4, skew=-0.15, patch=0.4), 4)
+    sunk = spots(warped(at, 0.006, 0.03, 5, 3), 0.07, (0.002, 0.016), 0.5, 6, (1.5, 1, 1))
+    deep = np.clip(sunk.inside / np.maximum(sunk.radius, 1e-4), 0, 1) * fading(0.02, at.footprint)
+    rim = np.exp(-np.square(sunk.inside / 0.0035)) * fading(0.006, at.footprint)
+    hollow = np.clip(-0.5 * drift - 0.25 * crust + 0.9 * deep, -1, 1.4)
+    color = palette(0.58 - 0.30 * hollow + 0.05 * crust, "#b3c2d4", "#ced9e4", "#e3e8ec", "#f3f4f4")
+    color = shade(color, 0.035 * grain + 0.02 * crust - 0.05 * rim * np.clip(1 + grain, 0, 2))
     twig = marks(at, 0.07, 0.0022, 2, 0.0, 2 * np.pi, 8, 0.85, 0.5)  # what the wind broke off
-    crumb = spots(warped(at, 0.002, 0.006, 9, 3), 0.06, (0.0006, 0.004), 0.25, 10).cover
-    fallen = np.clip(twig.cover * (twig.random(1) < 0.05) + 0.9 * crumb, 0, 1)
+    crumb = spots(warped(at, 0.002, 0.006, 9, 3), 0.05, (0.0006, 0.004), 0.3, 10).cover
+    fallen = np.clip(twig.cover * (twig.random(1) < 0.06) + 0.9 * crumb, 0, 1)
     color = mix(color, palette(0.5 + 0.2 * grain, "#3a2f26", "#5c4b3c", "#83705c"), 0.85 * fallen)
-    return Look(
-        color,
-        np.clip(0.72 + 0.06 * grain + 0.04 * crust - 0.5 * spark, 0.1, 1),
-        0.0,
-        0.014 * drift + 1.8e-4 * crust + 8e-5 * grain - 0.002 * trodden,
-    )
+    rough = np.clip(0.72 + 0.06 * grain + 0.04 * crust, 0.1, 1)
+    return Look(color, rough, 0.0, 0.014 * drift + 1.8e-4 * crust + 8e-5 * grain - 0.003 * deep + 4e-4 * fallen)
 
 
 def ice(at: Place) -> Look:
@@ -254,29 +250,24 @@ def ice(at: Place) -> Look:
 
 
 def ash(at: Place) -> Look:
-    """A cold hearth: pale powder in drifts, curled white flakes that keep the grain of what burnt, crumbs of charcoal."""
-    flat = at.flat
+    """A cold hearth: pale powder in soft drifts and crumbs, flakes that keep the grain of what burnt, bits of charcoal."""
     bent = warped(at, 0.003, 0.03, 1, 4)
     drift = fbm(bent, Spectrum(0.09, 0.0012, 0.8, tails=0.2, patch=0.4), 2)
     grit = fbm(at, Spectrum(0.003, 0.0002, 1.08, tails=0.5, skew=-0.2, patch=0.5), 3)
-    color, height = palette(0.5 + 0.15 * drift, "#77736f", "#918d88", "#a8a49f", "#c0bdb8"), 7e-4 * drift + 7e-5 * grit
-    ragged = warped(flat, 0.0011, 0.004, 8, 3)
-    lain = Place(ragged.p, ragged.p[:2], at.face, at.footprint, at.period, at.seed)
-    for k in range(2):
-        flake = marks(lain, 0.026, 0.008, 5, 1.3 * k, 2 * np.pi, 4 + k, 0.8, 0.25)
-        here = flake.cover * (flake.random(1) < 0.4)
-        side = np.clip(np.where(here > 0, flake.across, 0), -1, 1)
-        grain = np.sin(14 * side + 6 * flake.random(3) + 1.5 * grit) * fading(0.002, at.footprint)
-        tone = palette(0.5 + 0.9 * (flake.random(2) - 0.5) + 0.1 * grain, "#8f8b87", "#bab6b1", "#d6d3ce", "#e6e4e0")
-        color = mix(shade(color, -0.25 * here * (abs(side) > 0.9)), shade(tone, 0.07 * grain - 0.2 * side), 0.8 * here)
-        height = mix(height, height + 5e-4 + 4e-4 * side, here)
-    coal = spots(warped(at, 0.0012, 0.004, 5, 3), 0.012, (0.0004, 0.0030), 0.45, 6, (0.8, 1.5, 1))
-    char = coal.cover
-    color = mix(shade(color, 0.11 * grit), palette(0.5 + 0.25 * grit, "#232221", "#33312f", "#4a4744"), 0.9 * char)
+    color, height = palette(0.5 + 0.18 * drift, "#7f7c79", "#9a9794", "#b3b0ac", "#cbc9c5"), 8e-4 * drift + 7e-5 * grit
+    for k, (size, radius) in enumerate(((0.0035, 0.7), (0.011, 0.55))):
+        crumb = heap(bent, size, STONES._replace(radius=radius, rounding=0.8, sharp=0.5, tilt=0.3), 4 + k, (1, 1.5, 1))
+        own = 0.5 * (crumb.random(1) - 0.5) * crumb.shown
+        tone = palette(0.5 + own + 0.12 * drift, "#908c88", "#b1aeaa", "#cac7c3", "#e2e0dc")
+        grain = np.sin(np.float32(2600) * at.p[0] + 6 * crumb.random(3) + grit) * fading(0.0014, at.footprint)
+        black = (crumb.random(2) < 0.05 + 0.05 * k) * crumb.shown + (0.05 + 0.05 * k) * (1 - crumb.shown)
+        tone = mix(tone, palette(0.5 + 0.25 * grit, "#201f1e", "#343230", "#4a4744"), 0.9 * black)
+        soft = np.clip(0.75 + 0.3 * drift, 0.3, 1) * np.maximum(crumb.cover * np.clip(1.3 - crumb.nook, 0, 1), 0)
+        color = mix(color, shade(tone, 0.05 * grain + 0.3 * crumb.lean - 0.5 * (crumb.nook - 0.25)), soft)
+        height = height + 0.16 * crumb.height * soft
     dust = masked(at, Spectrum(0.012, 0.0004, 0.9), 0.2, 9, 0.4)
-    color = mix(color, palette(0.5 + 0.2 * grit, "#a5a19c", "#bdbab5"), 0.5 * dust)
-    rough = np.clip(0.95 + 0.03 * grit - 0.2 * char, 0, 1)
-    return Look(tint(color, 0.04 * noise(at, 0.03, 7)), rough, 0.0, height + 1e-3 * char - 6e-4)
+    color = shade(mix(color, palette(0.5 + 0.2 * grit, "#aca8a3", "#c4c1bc"), 0.5 * dust), 0.10 * grit)
+    return Look(tint(color, 0.04 * noise(at, 0.03, 7)), np.clip(0.95 + 0.03 * grit, 0, 1), 0.0, height - 5e-4)
 
 
 def charcoal(at: Place) -> Look:

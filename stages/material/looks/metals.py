@@ -8,11 +8,13 @@ import numpy as np
 
 from stages.material.look import Look, Substance, mix, palette, shade, tint
 from stages.material.patterns import (
+    PEBBLES,
     Array,
     Spectrum,
     cells,
     fading,
     fbm,
+    heap,
     line,
     marks,
     masked,
@@ -106,16 +108,21 @@ def cast(at: Place, kind: Metal) -> Look:
     return look._replace(color=shade(look.color, 0.16 * np.clip(pebble, -2, 1.5) - 0.5 * pits))
 
 
+BLOWS = PEBBLES._replace(radius=0.95, vary=0.25, sharp=0.0, rounding=1.0, slope=0.7, thick=0.66, lift=0.2, tilt=0.1)
+"""Round dents, upside down: a heap of balls."""
+
+
 def hammered(at: Place, kind: Metal) -> Look:
-    """Round dents from the hammer, each a shallow bowl that cuts into those before it, soft ridges where they meet."""
-    bent = warped(at, 0.0006, 0.02, 1)
-    dent, late = cells(bent, 0.016, 2, 0.75), cells(bent, 0.021, 4, 0.8)
-    shown = fading(0.012, at.footprint)
-    bowls = [(0.75 + 0.5 * blow.random(1)) * (blow.near / blow.size) ** 2 for blow in (dent, late)]
-    bowl = (np.minimum(bowls[0], bowls[1] + 0.06 + 0.16 * late.random(3)) - 0.28) * shown
+    """Round dents side by side, each a shallow bowl that cut into those before it, a ridge where two meet."""
+    dent = heap(at, 0.017, BLOWS, 2)
+    depth = dent.height / np.float32(0.017)
+    bowl = (0.62 - depth) * dent.shown
+    ridge = np.clip(dent.nook - 0.3, 0, 1) * dent.shown
     fine = fbm(at, Spectrum(0.003, 0.0003, 1.1, tails=0.4, patch=0.3), 3)
-    look = worked(at, kind, 0.22, 1.5e-3 * bowl, 0.5 * fine + 1.5 * bowl)
-    return look._replace(color=shade(look.color, 0.35 * bowl + 0.05 * (dent.random(2) - 0.5) * shown))
+    struck = (dent.random(3) - 0.5) * dent.shown
+    look = worked(at, kind, 0.2, 1.9e-3 * bowl + 4e-6 * fine, 0.5 * fine + 0.9 * bowl)
+    rough = np.clip(np.asarray(look.roughness) + 0.08 * struck - 0.06 * ridge, 0.02, 1)
+    return look._replace(color=shade(look.color, 0.30 * bowl + 0.10 * ridge + 0.10 * struck), roughness=rough)
 
 
 def machined(at: Place, kind: Metal) -> Look:

@@ -4,13 +4,17 @@ import numpy as np
 
 from stages.material.look import Look, mix, palette, shade, tint
 from stages.material.patterns import (
+    PEBBLES,
     Spectrum,
     cells,
     cracks,
     edge,
+    exceeds,
     fading,
     fbm,
+    heap,
     hexagons,
+    line,
     lost,
     marks,
     noise,
@@ -44,39 +48,49 @@ def skin(at: Place) -> Look:
 
 
 def bone(at: Place) -> Look:
-    """Old bone: dense and cream, pores drawn out along it, hairline cracks, brown where earth stained it."""
+    """Old bone: cream, fine-fibred along its length, pitted with tiny pores, split along by drying, brown where earth lay on
+    it, its outer skin flaked off here and there down to a rougher layer."""
     bent = warped(at, 0.003, 0.03, 1, 3)
-    stain = fbm(bent, Spectrum(0.08, 0.0012, 0.85, (1, 1.8, 1), 0.2, -0.1, 0.5), 2)
-    fine = fbm(at, Spectrum(0.0024, 0.0002, 1.0, (1, 2.5, 1), 0.5, -0.2, 0.5), 3)
-    pore = spots(bent, 0.0034, (0.0002, 0.0010), 0.75, 4, (0.8, 1.6, 1)).cover * np.clip(0.7 - 0.3 * stain, 0, 1)
-    crack = cracks(bent, 0.04, 0.0005, 0.05, 5, 2, 0.03, (0.6, 3, 1))
-    swell = fbm(at, Spectrum(0.05, 0.008, 0.6), 6)
-    earth = np.clip(crack.cover + 0.35 * np.exp(-crack.near / 0.0012) + 0.8 * pore, 0, 1)
-    color = palette(0.55 + 0.13 * stain + 0.06 * fine, "#b39c74", "#cdbb95", "#ded0b1", "#e9dfc8")
-    color = mix(shade(color, 0.05 * fine), palette(0.5 + 0.2 * fine, "#4c3923", "#6d5536"), 0.7 * earth)
-    height = 4e-4 * swell + 1.2e-5 * fine - 2.5e-4 * crack.cover - 2e-4 * pore
-    return Look(
-        tint(color, 0.03 * stain + 0.03 * noise(at, 0.02, 7)),
-        np.clip(0.55 + 0.05 * fine - 0.05 * stain + 0.25 * earth, 0, 1),
-        0.0,
-        height,
-    )
+    stain = fbm(bent, Spectrum(0.08, 0.0008, 0.85, (1, 1.8, 1), 0.2, -0.1, 0.5), 2)
+    fine = fbm(at, Spectrum(0.003, 0.0002, 1.0, (1, 6, 1), 0.5, -0.2, 0.5), 3)
+    pore = fbm(at, Spectrum(0.0011, 0.0003, 1.0, (1, 2.2, 1), 0.5, patch=0.7), 4)
+    pit = np.clip(pore - 2.0 + 0.6 * noise(at, 0.03, 5), 0, 1.2)
+    grown = cells(warped(at, 0.0008, 0.05, 11, 2), 0.013, 6, 1.0, (1, 14, 1))
+    gape = np.clip(0.7 * noise(at, 0.02, 7, (1, 6, 1)) - 0.15, 0, 1)
+    gape = gape * np.clip(0.5 + (abs(grown.offset[0]) - abs(grown.offset[1])) / 0.003, 0, 1)  # along the bone, not across
+    split = line(grown.border, 0.00022 * gape, at.footprint) * fading(0.006, at.footprint)
+    soil = np.exp(-grown.border / 0.0009) * gape * fading(0.006, at.footprint)
+    shape = Spectrum(0.06, 0.0006, 0.75, (1, 1.6, 1), patch=0.4)
+    field, hidden = fbm(bent, shape, 8), lost(at, shape)
+    worn, edge_of = exceeds(field, 1.6, 0.12, hidden), exceeds(field, 1.3, 0.3, hidden)
+    swell = fbm(at, Spectrum(0.05, 0.008, 0.6), 9)
+    color = palette(0.58 + 0.10 * stain + 0.03 * fine, "#b59d74", "#d6c6a2", "#e5dac0", "#f0e9d9")
+    rough_layer = palette(0.5 + 0.16 * fine + 0.2 * pore, "#a48d66", "#c4b28d", "#dccfb0")
+    color = mix(shade(color, 0.04 * fine + 0.10 * (edge_of - worn)), rough_layer, 0.85 * worn)
+    earth = np.clip(0.75 * split + 0.3 * soil + 0.5 * pit * (1 + worn), 0, 1)
+    color = mix(color, palette(0.5 + 0.2 * fine, "#46331f", "#6b5233"), 0.75 * earth)
+    height = 4e-4 * swell + 1.5e-5 * fine - 2e-4 * split - 1.5e-4 * pit - 1.6e-4 * worn * (1 + 0.3 * pore)
+    rough = 0.5 + 0.05 * fine - 0.05 * stain + 0.25 * earth + 0.2 * worn
+    return Look(tint(color, 0.03 * stain + 0.03 * noise(at, 0.02, 10)), np.clip(rough, 0, 1), 0.0, height)
 
 
 def horn(at: Place) -> Look:
-    """Cow horn: amber to black in streaks along it, growth rings across, scraped, polished in places."""
+    """Cow horn, scraped and polished: amber that one sees into, dark flames drawn out along it, fine layers, a pale cloud."""
     flat = at.flat
-    bent = warped(flat, 0.0015, 0.06, 1, 2)
-    streak = fbm(bent, Spectrum(0.03, 0.0012, 0.85, (1, 9, 1), 0.2, -0.1, 0.4), 2)
-    cloud = fbm(bent, Spectrum(0.12, 0.02, 0.7, (1, 2.5, 1)), 3)
-    fibre = fbm(flat, Spectrum(0.0024, 0.0002, 1.0, (1, 18, 1), 0.4, -0.1, 0.4), 4)
-    ring = fbm(bent, Spectrum(0.02, 0.0025, 0.75, (12, 1, 1), 0.2), 5)
-    scratch = marks(at, 0.03, 0.0003, 4, 1.5, 0.9, 6, 0.7, 0.1).cover
-    t = 0.46 + 0.13 * streak + 0.20 * cloud + 0.025 * ring + 0.06 * fibre
-    color = palette(t, "#241a14", "#4a3524", "#856239", "#b9945f", "#d9c297")
-    color = shade(color, 0.09 * fibre + 0.06 * ring + 0.12 * scratch)
-    rough = 0.22 + 0.05 * fibre + 0.03 * ring + 0.2 * scratch
-    return Look(color, np.clip(rough, 0.05, 1), 0.0, 5e-5 * ring + 8e-6 * fibre - 6e-6 * scratch)
+    bent = warped(flat, 0.004, 0.09, 1, 2)
+    flame = fbm(bent, Spectrum(0.06, 0.0012, 0.62, (1, 3.2, 1), 0.1, -0.1, 0.3), 2)
+    cloud = fbm(bent, Spectrum(0.10, 0.02, 0.6, (1, 1.6, 1)), 3)
+    layer = fbm(bent, Spectrum(0.012, 0.0006, 0.7, (1, 7, 1), 0.2, patch=0.5), 4)
+    fibre = fbm(flat, Spectrum(0.002, 0.00015, 1.1, (1, 6, 1), 0.4, -0.1, 0.4), 5)
+    ring = fbm(bent, Spectrum(0.03, 0.006, 0.6, (9, 1, 1), 0.2), 6)
+    scratch = marks(at, 0.03, 0.0002, 4, 1.5, 0.9, 7, 0.7, 0.1).cover
+    dark = np.clip(0.38 + 0.42 * flame + 0.24 * cloud, 0, 1)
+    depth = dark * dark * (3 - 2 * dark)
+    color = palette(0.5 + 0.22 * cloud - 0.12 * flame + 0.05 * layer + 0.03 * ring, "#9a6a30", "#c1935a", "#d8b987", "#e8d8b6")
+    color = mix(color, palette(0.45 + 0.1 * layer + 0.15 * cloud, "#17110d", "#2a1f18", "#4f3926"), depth)
+    color = tint(shade(color, 0.11 * fibre + 0.06 * layer + 0.03 * ring + 0.08 * scratch), 0.05 * cloud)
+    rough = 0.2 + 0.03 * fibre + 0.03 * layer + 0.16 * scratch
+    return Look(color, np.clip(rough, 0.05, 1), 0.0, 4e-5 * ring + 4e-6 * layer + 3e-6 * fibre - 4e-6 * scratch)
 
 
 HAIRS = Spectrum(0.0014, 0.00012, 0.95, (1, 26, 1), 0.35, -0.1, 0.3)
@@ -148,23 +162,27 @@ def feathers(at: Place) -> Look:
     )
 
 
+CELLS = PEBBLES._replace(radius=0.9, vary=0.45, sharp=0.12, rounding=1.0, slope=0.9, thick=0.6, lift=0.25, tilt=0.0)
+"""Bubbles of a foam: what a heap has as its backs is their hollow."""
+
+
 def bread(at: Place) -> Look:
-    """The crumb of a white loaf: bubbles of every size, drawn a little up as it rose, thin pale walls, dusk in their depth."""
-    bent = warped(warped(at, 0.0009, 0.012, 1, 2), 0.00012, 0.0016, 2, 2)
+    """The crumb of a white loaf: bubbles of every size pressed against one another, drawn up as it rose, thin pale walls that
+    let light through, dusk in their depth."""
+    bent = warped(at, 0.0012, 0.012, 1, 2)
     fine = fbm(at, Spectrum(0.0016, 0.00012, 1.0, tails=0.3, skew=-0.1, patch=0.4), 3)
     wide = fbm(at, Spectrum(0.05, 0.004, 0.8), 4)
-    color = palette(0.6 + 0.06 * wide + 0.08 * fine, "#e0c896", "#ecdab2", "#f3e6c8", "#f7eed8")
-    height = 1e-5 * fine + 3e-4 * wide
-    for k, (size, radius, share) in enumerate(
-        ((0.0013, 0.00062, 0.95), (0.0024, 0.0012, 0.9), (0.0050, 0.0025, 0.75), (0.0115, 0.0056, 0.6))
-    ):
-        hole = spots(bent, size, (0.55 * radius, 1.15 * radius), share, 5 + k, (1, 1.3, 1))
-        deep = np.clip(hole.inside / np.maximum(hole.radius, 1e-5), 0, 1)
-        rim = np.exp(-((hole.inside / (0.16 * radius)) ** 2)) * fading(radius, at.footprint)
-        floor = palette(0.95 - 1.0 * np.sqrt(deep) + 0.07 * fine, "#a9804a", "#c39c64", "#d8b982", "#e8d3a8")
-        color = mix(shade(color, 0.05 * rim), floor, hole.cover * (0.4 + 0.13 * k))
-        height = height - hole.cover * (0.08 + 0.05 * k) * radius * deep * (2 - deep) + 0.015 * radius * rim
-    return Look(tint(shade(color, 0.05 * fine), 0.03 * wide), np.clip(0.82 + 0.04 * fine, 0, 1), 0.0, height + 5e-4)
+    wall = palette(0.55 + 0.10 * wide + 0.10 * fine, "#e2cda1", "#efdfba", "#f6ecd3", "#faf4e6")
+    color, height = wall, 2e-5 * fine
+    for k, (size, radius) in enumerate(((0.0015, 0.9), (0.0040, 0.68), (0.0105, 0.52))):
+        bubble = heap(bent, size, CELLS._replace(radius=radius), 5 + k, (1, 1.25, 1))
+        deep = np.clip(bubble.height / (0.8 * size), 0, 1)
+        floor = palette(0.92 - 0.8 * deep + 0.08 * fine + 0.2 * (bubble.random(1) - 0.5) * bubble.shown,
+                        "#a98350", "#cdb07f", "#e6d0a4", "#f5e8cb")  # fmt: skip
+        color = mix(color, shade(floor, 0.25 * (bubble.nook - 0.25) * bubble.shown), bubble.cover * (0.55 + 0.15 * k))
+        height = height - (0.13 + 0.02 * k) * bubble.height
+    color = tint(shade(color, 0.06 * fine), 0.03 * wide)
+    return Look(color, np.clip(0.82 + 0.04 * fine, 0, 1), 0.0, height + 3e-4 * wide + 0.0012)
 
 
 def chocolate(at: Place) -> Look:

@@ -9,8 +9,10 @@ from stages.material.patterns import (
     Spectrum,
     cracks,
     edge,
+    exceeds,
     fading,
     fbm,
+    lost,
     marks,
     masked,
     noise,
@@ -140,22 +142,27 @@ def cardboard(at: Place) -> Look:
 
 
 def corrugated_cardboard(at: Place) -> Look:
-    """Single-faced board: the flutes lie open, ridge after ridge of brown paper, dented here and there."""
+    """A carton's board with its liner half torn off: brown flutes, ridge after ridge with the glue's dark line on each back,
+    beside the smooth liner they show through, pale torn fibres between."""
     color, fine, fibre = sheet(at, KRAFT, ("#8a6439", "#d0ad80", "#7a5932", "#c49b68"), 0.5)
     flat = at.flat
     bent = warped(flat, 0.0002, 0.03, 11, 2)
     flute, _, pitch = repeats(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.0075, 0)
-    dent = masked(warped(flat, 0.002, 0.015, 12, 2), Spectrum(0.06, 0.006, 0.7, (1, 1.5, 1)), 0.06, 13, 0.3)
     shown = fading(pitch / 2, at.footprint)
-    wave = np.cos(np.pi * flute) * shown * (1 - 0.6 * dent)
-    crease = cracks(bent, 0.03, 0.0005, 0.2, 14, 2, 0.05, (2.2, 0.6, 1)).cover
-    color = shade(color, 0.22 * wave + 0.07 * fine - 0.12 * dent - 0.15 * crease - 0.02 * shown)
-    return Look(
-        color,
-        np.clip(0.88 + 0.04 * fine - 0.05 * wave, 0, 1),
-        0.0,
-        0.0015 * wave - 4e-4 * dent + 1e-5 * fine + 1.2e-5 * fibre - 1e-4 * crease,
-    )
+    wave = np.cos(np.pi * flute) * shown
+    shape = Spectrum(0.09, 0.0006, 0.7, (1, 2.2, 1), patch=0.4)
+    tear, hidden = fbm(warped(flat, 0.003, 0.012, 12, 3), shape, 13) + 0.12 * wave, lost(flat, shape)
+    liner, ragged = exceeds(tear, 0.0, 0.03, hidden), exceeds(tear, -0.35, 0.15, hidden)
+    fluff = (ragged - liner) * np.clip(0.5 + 0.5 * wave, 0, 1)
+    dent = masked(warped(flat, 0.002, 0.015, 14, 2), Spectrum(0.06, 0.006, 0.7, (1, 1.5, 1)), 0.05, 15, 0.3)
+    glue = np.exp(-np.square(flute / 0.16)) * shown * np.clip(0.7 + 0.4 * fine, 0, 1)
+    bare = shade(color, 0.34 * wave + 0.07 * fine - 0.15 * dent - 0.4 * glue * (1 - dent))
+    cover = shade(color, 0.03 * wave + 0.05 * fine + 0.08 - 0.1 * dent)
+    color = mix(bare, cover, liner)
+    color = mix(color, palette(0.5 + 0.25 * fine, "#c7a377", "#dcc19a", "#ead6b5"), 0.7 * fluff)
+    height = mix(0.0019 * wave * (1 - 0.6 * dent), 0.0024 + 1e-4 * wave - 3e-4 * dent, liner) - 0.001 + 2e-4 * fluff
+    rough = np.clip(0.88 + 0.04 * fine - 0.05 * wave * (1 - liner) + 0.06 * fluff, 0, 1)
+    return Look(color, rough, 0.0, height + 1e-5 * fine + 1.2e-5 * fibre)
 
 
 LOOKS = {

@@ -101,7 +101,6 @@ class Coat(NamedTuple):
 
 COATS = {
     "plaster": Coat(("#d9d3c7", "#e3ded3", "#eae6dc"), 0.0006, 6e-5, 0.25, 0.12),
-    "stucco": Coat(("#cfae7f", "#dcc096", "#e6d0ac"), 0.0016, 6e-4, 0.15, 0.15),
     "whitewash": Coat(("#dedbd2", "#e8e6df", "#efede7"), 0.0022, 1.5e-4, 0.25, 0.2, 0.07),
 }
 
@@ -147,8 +146,24 @@ def plaster(at: Place) -> Look:
 
 
 def stucco(at: Place) -> Look:
-    """Coarse outdoor render, ochre, sand standing out."""
-    return render(at, COATS["stucco"])
+    """Lime and sand dashed on a wall and knocked down with the trowel: islands with smooth flat tops and torn rims over a
+    rough ground, painted warm white, rain dirt in the low places, hair cracks."""
+    flat = at.flat
+    bent = warped(flat, 0.006, 0.03, 1, 3)
+    shape = Spectrum(0.035, 0.0012, 0.72, (1.35, 1, 1), patch=0.3)
+    dash, hidden = fbm(bent, shape, 2), lost(flat, shape)
+    island, rim = exceeds(dash, 0.15, 0.10, hidden), exceeds(dash, -0.1, 0.18, hidden)
+    sand = fbm(flat, Spectrum(0.005, 0.0005, 1.1, tails=0.5, skew=0.15, patch=0.4), 3)
+    drag = fbm(flat, Spectrum(0.03, 0.002, 0.8, (3, 1, 1), patch=0.4), 4)
+    low = np.clip(0.5 - 0.4 * dash, 0, 1) * (1 - island)
+    run = masked(flat, Spectrum(0.25, 0.004, 0.8, (0.5, 2.5, 1), patch=0.4), 0.2, 5, 0.8)
+    crack = cracks(flat, 0.3, 0.0008, 0.12, 6, 1, 0.06)
+    color = palette(0.5 + 0.10 * drag + 0.08 * sand, "#d3c9b8", "#e0d8c9", "#eae4d8")
+    color = shade(color, 0.10 * sand * (1 - 0.6 * island) + 0.05 * island - 0.28 * low - 0.14 * (rim - island))
+    color = mix(color, palette(0.5 + 0.2 * sand, "#8d8271", "#aca08d"), 0.35 * run * (0.35 + low))
+    color = tint(shade(color, -0.5 * crack.cover), 0.03 * noise(flat, 0.25, 7) + 0.05 * low)
+    height = 0.0016 * island + 8e-4 * rim + 3e-4 * sand * (1 - 0.8 * island) + 1.5e-4 * drag - 5e-4 * crack.cover - 0.0012
+    return Look(color, np.clip(0.9 + 0.03 * sand - 0.06 * island, 0, 1), 0.0, height)
 
 
 def whitewash(at: Place) -> Look:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stages.material.look import Look, mix, palette, shade, tint
+from stages.material.look import Look, averaged, mix, palette, shade, tint
 from stages.material.patterns import (
     Array,
     Spectrum,
@@ -10,10 +10,12 @@ from stages.material.patterns import (
     fading,
     fbm,
     line,
+    lost,
     marks,
     masked,
     noise,
     spots,
+    threshold,
     warped,
     weave,
 )  # fmt: skip
@@ -95,17 +97,22 @@ def paint(at: Place) -> Look:
 
 
 def car_paint(at: Place) -> Look:
-    """Clear coat over a coloured base: deep gloss, faint orange peel, swirls of washing, metal flakes."""
-    flake = cells(at, 0.0006, 1, 1.0)
-    glint = (flake.random(1) - 0.5) * fading(0.0006, at.footprint)
+    """Clear coat over a red base: deep gloss, faint orange peel, swirls of washing, metal flakes that glint, a stone chip."""
+    flakes = Spectrum(0.0009, 0.0003, 1.0, tails=0.9, skew=0.3, patch=0.3)
+    flake = fbm(at, flakes, 1)
     peel = fbm(at, Spectrum(0.004, 0.0015, 0.6), 2)
     swirl = marks(at.flat, 0.06, 0.00012, 4, 0.0, 6.2, 3, 0.7, 0.35)
     mist = fbm(at, Spectrum(0.15, 0.004, 0.7), 4)
     dust = spots(at, 0.007, (0.0001, 0.0004), 0.4, 5).cover
-    color = palette(0.5 + 0.4 * glint + 0.12 * mist, "#c2c2c4", "#d2d2d4", "#e2e2e4")
-    color = shade(color, 0.22 * glint + 0.03 * swirl.cover + 0.15 * dust)
-    rough = 0.055 + 0.012 * np.clip(mist, -2, 3) + 0.05 * swirl.cover * swirl.random(1) + 0.25 * dust + 0.02 * glint
-    return Look(color, np.clip(rough, 0.01, 1), 0.0, 8e-6 * peel + 1e-5 * dust)
+    chip = spots(warped(at, 0.0003, 0.002, 6), 0.08, (0.0004, 0.0022), 0.35, 7)
+    color = averaged(0.5 + 0.17 * flake + 0.10 * mist, 0.19 * lost(at, flakes), "#5c0b10", "#86121a", "#ab2028", "#d06666")
+    color = shade(color, 0.05 * swirl.cover + 0.2 * dust)
+    core = threshold(chip.inside, 0.0004, np.maximum(0.0002, 0.5 * at.footprint))
+    color = mix(color, palette(0.5 + 0.3 * flake, "#8f9295", "#c9cbcc"), chip.cover)
+    color = mix(color, palette(0.5 + 0.3 * flake, "#4b4f52", "#6d7072"), core)
+    rough = 0.055 + 0.012 * np.clip(mist, -2, 3) + 0.05 * swirl.cover * swirl.random(1) + 0.25 * dust + 0.4 * chip.cover
+    height = 1.2e-5 * peel + 1e-5 * dust - 8e-5 * chip.cover
+    return Look(color, np.clip(rough + 0.008 * flake, 0.01, 1), 0.0, height, 1 - chip.cover)
 
 
 def painted_wood(at: Place) -> Look:

@@ -4,7 +4,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from stages.material.look import Look, Substance, mix, over, palette, shade, tint
+from stages.material.look import Look, Substance, averaged, mix, over, palette, shade, tint
 from stages.material.looks.metals import METALS, Metal, rolled
 from stages.material.patterns import (
     Array,
@@ -140,25 +140,34 @@ def weathering_steel(at: Place) -> Look:
 
 
 def verdigris(at: Place) -> Look:
-    """Copper in the weather for a century: chalky blue-green, paler where water ran, brown oxide where it is thin."""
+    """Copper in the weather: brown-black tarnish, blue-green powder that grew in clumps and ran down in dribbles, pale where
+    it is thick, bright metal where it was rubbed."""
     bent = warped(at, 0.006, 0.04, 1, 4)
     up = at.upright
-    run = fbm(warped(up, 0.003, 0.08, 2, 2), Spectrum(0.45, 0.0014, 0.85, (0.045, 1, 0.045), 0.2, patch=0.5), 3)
-    shape = Spectrum(0.12, 0.0006, 0.82, tails=0.15, patch=0.4)
-    crust, hidden = fbm(bent, shape, 4) + 0.45 * run, lost(at, shape)
-    grit = fbm(at, Spectrum(0.004, 0.0003, 1.06, tails=0.5, skew=-0.1, patch=0.5), 5)
-    bare = exceeds(-crust, level_of(0.13), 0.12, hidden)
-    thin = exceeds(-crust, level_of(0.34), 0.45, hidden)
-    pale = exceeds(crust + 0.3 * run, level_of(0.3), 0.4, hidden)
-    speck = spots(warped(at, 0.0005, 0.002, 6), 0.006, (0.0002, 0.0012), 0.4, 7).cover
-    color = palette(0.5 + 0.2 * crust + 0.05 * grit, "#3f7466", "#57907d", "#6ea792", "#86b9a2")
-    color = mix(color, palette(0.5 + 0.2 * grit, "#98c4b2", "#b5d6c6", "#cfe3d6"), 0.6 * pale)
-    color = mix(color, palette(0.5 + 0.25 * grit, "#3f5a4c", "#546a55"), 0.55 * thin)
-    color = mix(color, palette(0.5 + 0.25 * grit, "#33261d", "#4b3526", "#664731"), 0.85 * np.maximum(bare, 0.8 * speck))
-    color = tint(shade(color, 0.13 * grit), 0.05 * noise(bent, 0.03, 8), 0.05 * noise(bent, 0.06, 9))
-    bronze = np.clip(bare - 0.3, 0, 1)
-    height = 6e-5 * grit + 9e-5 * pale - 1.2e-4 * bare - 5e-5 * speck
-    return Look(color, np.clip(0.82 + 0.05 * grit + 0.04 * pale - 0.3 * bronze, 0.2, 1), 0.45 * bronze, height, 1 - bare)
+    dribble = Spectrum(0.10, 0.0014, 0.9, (0.07, 1, 0.07), 0.2, patch=0.5)
+    run = fbm(warped(up, 0.002, 0.05, 2, 2), dribble, 3)
+    source = fbm(warped(up, 0.01, 0.1, 9, 2), Spectrum(0.35, 0.02, 0.7, (1, 0.6, 1)), 10)
+    shape = Spectrum(0.09, 0.0006, 0.85, tails=0.15, patch=0.4)
+    grit = fbm(at, Spectrum(0.004, 0.0003, 1.06, tails=0.5, skew=0.2, patch=0.5), 5)
+    grown = 0.75 * fbm(bent, shape, 4) + 0.5 * run * np.clip(0.7 + 0.5 * source, 0, 1.6) + 0.45 * source
+    hidden = np.hypot(0.75 * lost(at, shape), 0.4 * lost(at, dribble))
+    steps = ((-0.45, 0.7), (0.1, 0.1), (1.0, 0.3))
+    haze, crust, clump = (exceeds(grown + 0.12 * grit, level, soft, hidden) for level, soft in steps)
+    rubbed = exceeds(-grown + 0.3 * grit, 1.5, 0.15, hidden)
+    clump, rubbed = clump / np.maximum(crust, 0.02), rubbed / np.maximum(1 - crust, 0.02)  # of the crust, of the rest
+    clump, rubbed = np.minimum(clump, 1), np.minimum(rubbed, 1)
+    tone = fbm(bent, Spectrum(0.03, 0.0008, 0.9, patch=0.4), 6)
+    tarnish = palette(0.5 + 0.2 * tone + 0.12 * grit, "#1f1511", "#37261b", "#553724", "#744829")
+    tarnish = mix(tarnish, palette(0.5 + 0.2 * grit, "#34483f", "#4c6a5e"), 0.55 * haze)
+    powder = averaged(0.42 + 0.16 * tone + 0.10 * grit, 0.2 * lost(at, shape), "#2f7069", "#459088", "#66aca4", "#8cc6bd")
+    powder = mix(powder, palette(0.5 + 0.25 * grit, "#9dcfc6", "#c4e3da", "#dfeee6"), 0.75 * clump)
+    metal = palette(0.6 + 0.2 * grit, "#b8714f", "#e09a76", "#f2bb9c")
+    color = mix(mix(tarnish, metal, 0.8 * rubbed), powder, crust * (0.86 + 0.14 * clump))
+    color = tint(shade(color, 0.12 * grit), 0.05 * noise(bent, 0.03, 8), 0.04 * tone)
+    height = 7e-5 * grit * (0.3 + crust) + 1.6e-4 * crust + 2.2e-4 * clump - 4e-5 * rubbed - 1.2e-4
+    rough = mix(0.5 + 0.08 * tone - 0.22 * rubbed, 0.92 + 0.04 * grit, crust)
+    metallic = (0.35 * (1 - haze) + 0.6 * rubbed) * (1 - crust)
+    return Look(color, np.clip(rough, 0.15, 1), np.clip(metallic, 0, 1), height, crust)
 
 
 def patinated(at: Place, kind: Metal) -> Look:

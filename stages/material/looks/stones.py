@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from stages.material.heap_kernels import Pieces
 from stages.material.look import Look, averaged, each, mix, palette, shade, tint
 from stages.material.patterns import (
     PEBBLES,
@@ -47,26 +48,34 @@ GRANITES = {
 }
 
 
+CRYSTALS = Pieces(0.9, 0.5, 0.55, 0.0, 1.0, 0.9, 0.5, 0.0)
+"""Grown in the melt: flat faces where they were free, cut by their neighbours where not."""
+
+
 def igneous(at: Place, kind: Granite) -> Look:
-    """Interlocking grains: feldspar pale and in blocks, quartz grey and clear, mica black, shiny and small."""
-    bent = warped(at, 0.07 * kind.size, 0.6 * kind.size, 1, 3)
-    coarse, fine, flake = (
-        cells(bent, kind.size, 2),
-        cells(bent, 0.5 * kind.size, 3),
-        cells(bent, 0.32 * kind.size, 4, 1.0, (1, 1.8, 1)),
-    )
-    show, show_fine, show_flake = (fading(k * kind.size, at.footprint) for k in (1.0, 0.5, 0.32))
-    cloud = fbm(at, Spectrum(12 * kind.size, kind.size, 0.8), 5)
-    pale = (coarse.random(1) < kind.pale) * show + kind.pale * (1 - show)
-    dark = (flake.random(1) < kind.dark * (1.5 - pale) + 0.06 * cloud) * show_flake + kind.dark * (1.5 - kind.pale) * (
-        1 - show_flake
-    )
-    block = threshold(coarse.border, 0.0, 0.1 * kind.size + at.footprint)  # crystals are greyer towards their borders
-    feldspar = each(0.5 * coarse.random(2) + 0.25 * fine.random(3) + 0.25 * block, show, *kind.feldspar)
-    quartz = each(fine.random(4), show_fine, *kind.quartz)
-    color = mix(mix(quartz, feldspar, pale), each(flake.random(5), show_flake, *kind.mica), dark)
-    grit = fbm(at, Spectrum(0.4 * kind.size, 0.0003, 1.0, tails=0.4, patch=0.4), 6)
-    color = tint(shade(color, 0.10 * grit + 0.04 * cloud), 0.07 * (fine.random(7) - 0.5) * show_fine)
+    """Interlocking grains: feldspar in blocks, zoned and cleaved; quartz between them, grey and glassy; mica in black nests."""
+    size = kind.size
+    bent = warped(at, 0.05 * size, 0.5 * size, 1, 3)
+    spar, glass = heap(bent, 1.25 * size, CRYSTALS, 2), cells(bent, 0.55 * size, 3)
+    flake = heap(bent, 0.42 * size, CRYSTALS._replace(radius=0.75), 4, (1, 1.7, 1))
+    show, show_fine = fading(size, at.footprint), fading(0.5 * size, at.footprint)
+    cloud = fbm(at, Spectrum(12 * size, size, 0.8), 5)
+    grit = fbm(at, Spectrum(0.4 * size, 0.0003, 1.0, tails=0.4, patch=0.4), 6)
+    pale = spar.cover * (spar.random(1) < kind.pale / 0.8) * show + kind.pale * (1 - show)
+    nest = noise(at, 1.6 * size, 7)
+    dark = flake.cover * (flake.random(1) < 2.2 * kind.dark * np.clip(0.75 + 0.6 * nest - 0.25 * pale, 0, 2)) * flake.shown
+    dark = np.clip(dark + 1.1 * kind.dark * (1 - flake.shown), 0, 1)
+    zone = np.clip(spar.height / size, 0, 1.4) * show  # from the rim inwards
+    cleft = fbm(bent.moved(np.stack([spar.random(8), spar.random(9), spar.random(10)]) * np.float32(0.1)),
+                Spectrum(0.25 * size, 0.0004, 0.95, (1, 5, 1), 0.3), 8)  # fmt: skip
+    feldspar = palette(0.32 + 0.5 * (spar.random(2) - 0.5) * show + 0.22 * zone + 0.1 * cleft, *kind.feldspar)
+    feldspar = shade(feldspar, 0.28 * spar.lean + 0.05 * cleft - 0.12 * (spar.nook - 0.2) * show)
+    quartz = palette(0.5 + 0.9 * (glass.random(4) - 0.5) * show_fine + 0.12 * grit, *kind.quartz)
+    quartz = shade(quartz, 0.1 * (np.clip(glass.border / (0.2 * size), 0, 1) - 0.5) * show_fine)  # clear, darker within
+    mica = shade(palette(0.5 + 0.8 * (flake.random(5) - 0.5) * flake.shown, *kind.mica), 0.5 * flake.lean + 0.1 * grit)
+    soft = np.clip(0.7 + 0.4 * grit + 0.5 * (flake.random(6) - 0.5), 0.35, 1)  # grains go down into the stone
+    color = mix(mix(quartz, feldspar, pale * np.clip(0.9 + 0.1 * zone, 0, 1)), mica, dark * soft)
+    color = tint(shade(color, 0.09 * grit + 0.04 * cloud), 0.06 * (glass.random(7) - 0.5) * show_fine * (1 - pale))
     roughness = 0.34 - 0.12 * dark + 0.10 * pale + 0.04 * grit
     return Look(color, np.clip(roughness, 0.1, 1), 0.0, 2e-5 * grit - 6e-5 * (dark - kind.dark) + 4e-5 * (pale - kind.pale))
 
@@ -175,40 +184,52 @@ def limestone(at: Place) -> Look:
 
 
 def slate(at: Place) -> Look:
-    """Mud pressed into leaves and split along them: flat terraces with ragged edges, blue-grey, a rusty stain."""
+    """Mud pressed into leaves and split along them: terraces with ragged edges, each leaf of its own grey, some plum or green,
+    rust where water got in between, a silk along the cleavage."""
     bent = warped(at, 0.004, 0.04, 1, 4)
     leaf = 2.4 * fbm(bent, Spectrum(0.4, 0.003, 0.47, (1.4, 1, 1)), 2)
     step = np.floor(leaf)
     rise = leaf - step
-    lip = threshold(0.05 - rise, 0.0, 0.04)  # the broken edge of a leaf catches light, and lies dark below
-    tone = np.sin(step * 12.9898 + 4.0)
+    seen = fading(0.006, at.footprint)
+    lip = threshold(0.07 - rise, 0.0, 0.05) * seen  # the broken edge of a leaf catches light, and lies dark below
+    under = threshold(rise, 0.86, 0.12) * seen
+    tone, hue = np.sin(step * 12.9898 + 4.0), np.sin(step * 7.233 + 1.0)
     lines = fbm(at, Spectrum(0.03, 0.0006, 1.0, (5, 1, 1), tails=0.3, patch=0.5), 3)
     grit = fbm(at, Spectrum(0.003, 0.0004, 1.0, tails=0.4, patch=0.4), 4)
-    rusty = masked(bent, Spectrum(0.16, 0.002, 0.85, patch=0.5), 0.05, 5, 0.7)
-    color = palette(0.5 + 0.34 * tone + 0.03 * lines, "#3f4142", "#4d504f", "#5b5d5a", "#6d6c66")
-    color = mix(color, palette(0.5 + 0.2 * grit, "#55504a", "#6d6455"), 0.6 * rusty)
-    color = tint(
-        shade(color, 0.08 * grit + 0.04 * lines + 0.55 * lip - 0.22 * threshold(rise, 0.9, 0.1)), 0.05 * noise(bent, 0.06, 6)
-    )
-    height = 1.4e-3 * (step + np.clip(rise / 0.06, 0, 1)) + 2e-4 * rise + 4e-5 * lines + 3e-5 * grit - 7e-4
-    return Look(color, np.clip(0.56 + 0.06 * grit + 0.14 * lip + 0.1 * rusty, 0, 1), 0.0, height)
+    scar = fbm(bent, Spectrum(0.08, 0.002, 0.85, (2.5, 1, 1), 0.3, patch=0.5), 6)
+    rusty = masked(bent, Spectrum(0.16, 0.002, 0.85, patch=0.5), 0.10, 5, 0.6) * np.clip(0.5 + 0.5 * hue + lip, 0, 1)
+    color = palette(0.5 + 0.34 * tone + 0.05 * lines + 0.09 * scar, "#34383b", "#474c4f", "#5a5f60", "#72746f")
+    color = mix(color, palette(0.5 + 0.2 * grit, "#5b4630", "#85684a"), 0.6 * rusty)
+    color = shade(color, 0.09 * grit + 0.06 * lines + 0.07 * scar + 0.7 * lip * np.clip(1 + scar, 0, 2) - 0.5 * under)
+    color = tint(color, 0.05 * noise(bent, 0.06, 7) + 0.07 * hue, 0.05 * tone)
+    height = 1.6e-3 * (step + np.clip(rise / 0.06, 0, 1)) + 2e-4 * rise + 5e-5 * lines + 1.2e-4 * scar + 3e-5 * grit - 8e-4
+    return Look(color, np.clip(0.52 + 0.06 * grit + 0.06 * tone + 0.14 * lip + 0.12 * rusty, 0, 1), 0.0, height)
 
 
 def travertine(at: Place) -> Look:
-    """Lime laid down by springs: wavy cream and beige beds, holes drawn out along them where reeds and gas were."""
+    """Lime laid down by springs: wavy cream and beige beds, holes drawn out along them where reeds and gas were, some filled,
+    some shallow, dusk in the deep ones."""
     beds = bedded(at, 0.008, 0.25, 1)
     band = fbm(beds, Spectrum(0.09, 0.002, 0.9, (9, 1, 9), patch=0.4), 2)
     porous = threshold(noise(beds, 0.05, 3, (6, 1, 6)), 0.1, 0.7)
     shape = Spectrum(0.011, 0.0006, 0.72, (2.6, 1, 2.6), patch=0.3)
+    hidden = lost(beds, shape)
     thick = fbm(beds, shape, 4) + 1.2 * porous
-    hole = exceeds(thick, 2.3, 0.12, lost(beds, shape))
-    rim = exceeds(thick, 1.9, 0.4, lost(beds, shape)) - hole
+    hole, deep = exceeds(thick, 2.2, 0.12, hidden), exceeds(thick, 2.75, 0.4, hidden)
+    rim = exceeds(thick, 1.7, 0.5, hidden) - hole
+    filled = threshold(noise(beds, 0.03, 9, (3, 1, 3)), 0.35, 0.15)
+    pin = masked(beds, Spectrum(0.003, 0.0004, 0.9, (2, 1, 2), patch=0.8), 0.03, 10, 0.2)
     cloud = fbm(at, Spectrum(0.2, 0.01, 0.8), 5)
     grain = fbm(at, Spectrum(0.008, 0.0003, 1.1, tails=0.3, skew=-0.15, patch=0.4), 6)
+    crystal = np.clip(fbm(beds, Spectrum(0.012, 0.001, 0.95, (5, 1, 5), 0.4), 11) - 1.3, 0, 1.5)  # clear calcite in seams
     color = palette(0.52 + 0.17 * band + 0.05 * cloud, "#a98d6b", "#c6ad8b", "#d9c6a8", "#e8dcc6")
-    color = mix(shade(color, 0.09 * grain - 0.14 * rim), palette(0.5 + 0.2 * grain, "#5f4c38", "#7f6a50"), 0.85 * hole)
-    color = tint(color, 0.06 * noise(beds, 0.04, 7, (5, 1, 5)))
-    return Look(color, 0.4 + 0.05 * grain - 0.03 * band + 0.4 * hole, 0.0, 2e-5 * grain + 3e-5 * band - 2.2e-3 * hole + 1.2e-4)
+    color = mix(color, palette(0.5 + 0.3 * grain, "#dcd3c0", "#f1ebdd"), 0.45 * crystal)
+    wall = palette(0.75 - 0.75 * deep + 0.18 * grain + 0.1 * band, "#3b2e20", "#6d563e", "#96795a", "#b79b77")
+    wall = mix(wall, palette(0.5 + 0.2 * grain, "#b7a384", "#d2c1a4"), 0.85 * filled)
+    color = shade(color, 0.09 * grain - 0.2 * rim * np.clip(0.6 + 0.5 * grain, 0, 1.5) - 0.45 * pin * (1 - hole))
+    color = tint(mix(color, wall, 0.95 * hole), 0.06 * noise(beds, 0.04, 7, (5, 1, 5)))
+    height = 2e-5 * grain + 3e-5 * band - (5e-4 * hole + 2.4e-3 * deep) * (1 - 0.9 * filled) - 2e-4 * pin + 1.2e-4
+    return Look(color, np.clip(0.4 + 0.05 * grain - 0.03 * band + 0.4 * hole * (1 - filled), 0, 1), 0.0, height)
 
 
 def basalt(at: Place) -> Look:
@@ -384,16 +405,18 @@ def gravel(at: Place) -> Look:
 
 
 def jade(at: Place) -> Look:
-    """Felted fibres of nephrite, polished: green clouds in pale green, a fine web of lighter veins."""
-    bent = warped(at, 0.005, 0.06, 1, 4)
-    cloud = fbm(bent, Spectrum(0.11, 0.001, 0.62, (1, 1.5, 1), patch=0.4), 3)
-    vein = cracks(bent, 0.06, 0.0006, 0.05, 4, 2)
-    fleck = fbm(at, Spectrum(0.004, 0.0003, 1.0, (1, 1.7, 1), tails=0.5, patch=0.5), 5)
-    dark = masked(bent, Spectrum(0.03, 0.0006, 0.85, patch=0.5), 0.05, 6, 0.5)
-    color = palette(0.5 + 0.2 * cloud, "#2a6b45", "#3a7c54", "#4f9067", "#6ba47c", "#8fbb95")
-    color = mix(color, palette(0.5 + 0.2 * fleck, "#b9d3b0", "#dbe7cd"), 0.3 * vein.cover + 0.15 * np.exp(-vein.near / 0.0025))
-    color = tint(shade(color, 0.09 * fleck - 0.3 * dark), 0.06 * noise(bent, 0.04, 7), 0.03 * cloud)
-    return Look(color, 0.11 + 0.05 * vein.cover + 0.015 * abs(fleck) + 0.03 * dark, 0.0, 2e-6 * fleck - 5e-6 * vein.cover)
+    """Felted fibres of nephrite, polished: pale and spinach green that run into one another, milky flecks, faint seams."""
+    bent = warped(warped(at, 0.012, 0.09, 1, 2), 0.003, 0.02, 2, 2)
+    cloud = fbm(bent, Spectrum(0.09, 0.003, 0.6, (1, 1.5, 1), patch=0.3), 3)
+    milk = fbm(bent, Spectrum(0.03, 0.004, 0.5, (1, 1.8, 1), 0.2, 0.1, 0.3), 4)
+    felt = fbm(at, Spectrum(0.004, 0.0003, 1.0, (1, 1.7, 1), tails=0.5, patch=0.5), 5)
+    seam = np.exp(-np.square(fbm(bent, Spectrum(0.07, 0.006, 0.5), 6) / 0.05)) * np.clip(0.4 + 0.6 * noise(at, 0.05, 7), 0, 1)
+    dark = masked(bent, Spectrum(0.012, 0.0006, 0.85, patch=0.7), 0.03, 8, 0.4)
+    color = palette(0.5 + 0.24 * cloud + 0.04 * felt, "#2a6444", "#3f7f57", "#5c9a70", "#83b48c", "#aecba8")
+    color = mix(color, palette(0.5 + 0.2 * felt, "#bfd6b6", "#e3ecd8"), 0.28 * np.clip(milk - 0.3, 0, 1.5))
+    color = mix(color, palette(0.5 + 0.2 * felt, "#a98f4e", "#cbb47a"), 0.22 * seam * np.clip(0.5 + cloud, 0, 1))
+    color = tint(shade(color, 0.06 * felt - 0.45 * dark), 0.06 * noise(bent, 0.06, 9), 0.06 * cloud)
+    return Look(color, 0.11 + 0.02 * abs(felt) + 0.04 * dark + 0.03 * seam, 0.0, 2e-6 * felt - 4e-6 * seam)
 
 
 def malachite(at: Place) -> Look:

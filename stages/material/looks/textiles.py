@@ -24,6 +24,7 @@ from stages.material.patterns import (
     marks,
     noise,
     repeats,
+    tufts,
     warped,
     weave,
     wickerwork,
@@ -275,48 +276,40 @@ def velvet(at: Place) -> Look:
     return Look(color, np.clip(0.72 - 0.08 * turned + 0.05 * tip, 0, 1), 0.0, 3e-4 * nap + 1.5e-5 * comb + 8e-6 * tip)
 
 
-def pile(at: Place, size: float, stops: tuple[str, ...], seed: int, depth: float) -> tuple[Array, Array, Array, Array]:
-    """Tufts or loops side by side. Returns: colours (3, P); their rise about 0, random number and twist, (P,) each."""
-    bent = warped(at.flat, 0.15 * size, 3 * size, seed, 2)
-    tuft = cells(bent, size, seed + 1, 0.6, (1, 1, 40))
-    shown = fading(size, at.footprint)
-    rise = (np.clip(1 - (tuft.near / (0.72 * size)) ** 2, 0, 1) - 0.55) * shown
-    angle = np.arctan2(tuft.offset[1], tuft.offset[0])
-    turn = np.cos(2 * angle + 14 * tuft.near / size + 6.28 * tuft.random(2)) * shown
-    color = each(tuft.random(3), shown, *stops) * np.maximum(1 + depth * rise, 0.05)
-    return color, rise, (tuft.random(4) - 0.5) * shown, turn
-
-
 def carpet(at: Place) -> Look:
-    """Cut pile of twisted yarns in heathered beige and brown, shaded where feet pressed it over."""
+    """Loop pile in rows: thick two-ply yarn of heathered wool, each loop lapping over the next, shaded where feet trod."""
+    row, stitch = 0.0048, 0.0066
     flat = at.flat
-    color, rise, own, turn = pile(at, 0.0034, ("#6f6257", "#8b7b6c", "#a39281", "#7d6d5e", "#958574", "#b6a693"), 1, 1.1)
+    loops = tufts(flat, row, stitch, 1)
+    mean = usual(tufts, row, stitch)["height"]
+    rise = thread_rise(loops, mean)
     trod = fbm(warped(flat, 0.02, 0.1, 5, 3), Spectrum(0.3, 0.006, 0.8, patch=0.5), 6)
-    fibre = fbm(warped(flat, 0.0005, 0.003, 7, 2), Spectrum(0.003, 0.0002, 1.0, (1, 1, 1), 0.5, 0.1, 0.4), 8)
-    color = tint(shade(color, 0.16 * fibre + 0.10 * turn + 0.08 * trod), 0.10 * own + 0.03 * fibre)
-    height = 0.0013 * rise + 0.0007 * own + 2e-4 * turn + 1.6e-4 * fibre + 0.001 * trod
-    return Look(color, np.clip(0.95 + 0.03 * fibre - 0.06 * rise, 0, 1), 0.0, height)
+    lean = np.where(loops.across > 0, flat.p[1], -flat.p[1])
+    fibre = fbm(flat.moved(np.stack([lean, 0 * lean, 0 * lean])), Spectrum(0.0016, 0.0002, 1.0, (1, 4, 1), 0.4, -0.1, 0.4), 8)
+    ply = np.cos(2 * np.pi * (0.75 * loops.across + 1.6 * loops.along)) * fading(0.0012, at.footprint)
+    own = (loops.random(5) - 0.5) * loops.seen
+    color = averaged(0.5 + 0.85 * own + 0.14 * fibre, 0.25 * (1 - loops.seen), "#6f6257", "#8b7b6c", "#a39281", "#b6a693")
+    color = relieved(shade(color, 0.14 * fibre + 0.12 * ply + 0.08 * trod), rise, mean, 1.15)
+    color = tint(color, 0.10 * (loops.random(6) - 0.5) * loops.seen)
+    height = 0.0034 * (rise - mean) + 1.5e-4 * ply + 8e-5 * fibre + 0.001 * trod
+    return Look(color, np.clip(0.95 + 0.03 * fibre - 0.06 * (rise - mean), 0, 1), 0.0, height)
 
 
 def towel(at: Place) -> Look:
-    """Terry: soft loops of white cotton yarn that stand in rows and flop every way, twisted, dark between."""
+    """Terry: loops of soft white cotton that stand in rows and flop to either side, twisted, shaded at their feet."""
+    row, stitch = 0.0021, 0.0030
     flat = at.flat
+    loops = tufts(flat, row, stitch, 1, 1.6)
+    mean = usual(tufts, row, stitch, 0, 1.6)["height"]
+    rise = thread_rise(loops, mean)
     fibre = fbm(warped(flat, 0.0003, 0.0016, 7, 2), Spectrum(0.0014, 0.00012, 1.0, tails=0.4, patch=0.3), 8)
     wide = fbm(flat, Spectrum(0.08, 0.003, 0.9, patch=0.4), 9)
-    color, height = palette(0.5 + 0.15 * fibre, "#a3a19b", "#b9b7b1", "#c9c7c1"), -4e-4 + 5e-5 * wide
-    for k in range(3):
-        loop = marks(at, 0.0042, 0.00085, 7, 1.2 + 0.9 * k, 4.4, 3 + k, 0.35, 0.8)
-        inside = abs(loop.across) < 2
-        side, seen = np.clip(np.where(inside, loop.across, 0), -1, 1), fading(0.0005, at.footprint)
-        back = (np.sqrt(1 - side * side) - 0.785) * seen * inside
-        ply = np.cos(2 * np.pi * (1.2 * side + 3.5 * loop.along)) * seen * inside
-        tone = each(loop.random(1), seen, "#d4d3ce", "#e6e5e1", "#efeeea", "#dddcd7")
-        tone = shade(tone, 0.30 * back + 0.05 * ply + 0.05 * fibre + 0.10 * (k - 1.6))
-        rim = np.exp(-((1 - abs(side)) / 0.16)) * seen * inside
-        color = mix(color, shade(tone, -0.22 * rim), loop.cover)
-        height = mix(height, -2e-4 + 2.6e-4 * k + 2.6e-4 * back + 2e-5 * ply + 1.2e-4 * (1 - loop.along**2), loop.cover)
-    color = tint(shade(color, 0.03 * wide), 0.02 * noise(flat, 0.02, 12))
-    return Look(color, np.clip(0.94 + 0.03 * fibre, 0, 1), 0.0, height)
+    ply = np.cos(2 * np.pi * (0.6 * loops.across + 2.6 * loops.along)) * fading(0.0005, at.footprint)
+    own = (loops.random(5) - 0.5) * loops.seen
+    color = palette(0.55 + 0.5 * own + 0.12 * fibre, "#d3d1ca", "#e3e1dc", "#eeece8")
+    color = relieved(shade(color, 0.05 * fibre + 0.06 * ply + 0.03 * wide + 0.12 * own), rise, mean, 0.62)
+    height = 0.0013 * (rise - mean) + 6e-5 * ply + 2e-5 * fibre + 1e-4 * wide
+    return Look(tint(color, 0.02 * noise(flat, 0.02, 12)), np.clip(0.94 + 0.03 * fibre, 0, 1), 0.0, height)
 
 
 def corduroy(at: Place) -> Look:
