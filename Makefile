@@ -20,6 +20,8 @@ OUT    ?=
 JOBS   ?= jobs
 # what `make export` writes every asset of JOBS for
 FOR    ?= blender
+# folder below which `make parts` finds armchair.obj, vintage_fan.glb, babylon_shaderball.glb, spot.obj and bob_uv.obj
+ASSETS ?= assets
 # meshes that `make beside` lays beside Cycles and three.js, and what they are made of
 BESIDE ?= demo/urn.obj bench/egg.obj bench/drum.obj
 STUFF  ?= weathered copper with verdigris in the crevices
@@ -31,12 +33,12 @@ DISTILL_OPTIONS    ?=
 BAKE_OPTIONS       ?=
 
 # recipes read all of these from the environment, so that names may hold blanks, quotes and signs
-export MESH PROMPT OUT JOBS FOR PREP_OPTIONS CONDITIONS_OPTIONS DISTILL_OPTIONS BAKE_OPTIONS
+export MESH PROMPT OUT JOBS FOR ASSETS PREP_OPTIONS CONDITIONS_OPTIONS DISTILL_OPTIONS BAKE_OPTIONS
 OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" \
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test campaign hostile uvs lint asset batch export docs bench beside clean
+.PHONY: help setup demo test campaign hostile uvs parts lint asset batch export docs bench beside clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -113,6 +115,9 @@ hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through pr
 
 uvs: $(VENV)/.ready | $(CYCLES)  ## models laid out in fifteen ways: UVs kept bit for bit, and the same picture in Cycles (half an hour)
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.uv_campaign -o uvs $$(cat $(CYCLES))
+
+parts: $(VENV)/.ready  ## parts with prompts of their own on real models below ASSETS, held against what their words mean
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.parts_campaign --assets "$$ASSETS" -o parts
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .

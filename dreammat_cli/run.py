@@ -44,6 +44,20 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
             click.echo(f"[{number} of {len(STAGES)}] {STAGES[number - 1]}", err=True)
         with context:
             context.command.invoke(context)
+        if STAGES[number - 1] == "prep" and not common.dry_run:
+            expect_parts(prep, contexts[STAGES.index("distill")].params["parts"])
+
+
+def expect_parts(prep: Path, asked: tuple[tuple[str, str], ...]) -> None:
+    """See that --part names what there is before anything long begins. Raises: InputError."""
+    if not asked:
+        return
+    from stages.asset.parts import labelled_parts
+    from stages.core.artifact import load_npz
+    from stages.core.schemas import PREP
+    from stages.distill.parts import claimed
+
+    claimed(asked, labelled_parts(load_npz(prep, PREP)))
 
 
 def split(text: str) -> list[str]:

@@ -145,8 +145,10 @@ def how_made(mesh: Artifact, made: Provenance) -> dict[str, str]:
     options = {**mesh.provenance.options, **said["distilled_with"]}
     chosen = ("quality", "steps", "views", "up", "uv", "padding", "texture_size", "crease_angle")
     edits = {"Edits": "; ".join(said["edited"]["list"])} if "edited" in said else {}
+    parts = "; ".join(f"{part['name']}: {part['prompt']}" for part in said.get("parts", ()))
     return {
         "Prompt": str(said["prompt"] or "none"),
+        **({"Parts": parts} if parts else {}),
         **edits,
         "Seed": str(made.seed),
         "Guidance": ", ".join([name, *(f"{key} {value[:12]}" for key, value in guidance.items() if isinstance(value, str))]),

@@ -365,7 +365,7 @@ def describe(mesh: Artifact, made: Artifact) -> dict[str, Any]:
     source, material = mesh.provenance.extra, made.provenance.extra
     return {
         **{key: source[key] for key in ("source_name", "source_format", "uv_kept", "findings")},
-        **{key: material[key] for key in ("prompt", "guidance", "environments")},
+        **{key: material[key] for key in ("prompt", "parts", "guidance", "environments")},
         "distilled_with": {key: made.provenance.options[key] for key in SAID_OF_OPTIONS if key in made.provenance.options},
         "material_slots": list(dict.fromkeys(part["material"] for part in source["parts"])),
     }

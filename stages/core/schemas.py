@@ -100,8 +100,9 @@ MATERIAL = Schema(
         "size": Field("i4", (2,)),  # width, height of those views
     },
     # recipe: as `material.recipe` writes it; residual: ResidualConfig as a dict; prompt; guidance: name and what identifies its
-    # model; environments: names used; extent: longest edge of the object in units of its source
-    extra=("recipe", "residual", "prompt", "guidance", "environments"),
+    # model; environments: names used; extent: longest edge of the object in units of its source; parts: {"name", "prompt"} of
+    # those that have prompts of their own
+    extra=("recipe", "residual", "prompt", "parts", "guidance", "environments"),
 )
 
 ASSET = Schema("dreammat.asset", 3, extra=("sets",), manifest="bake.json")

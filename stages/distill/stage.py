@@ -106,7 +106,7 @@ def _distill(
     claims, lines = claimed(options.parts, views.parts, carried)
     guidance = make_guidance(options, views, device, claims, like)
     budget = chosen_budget(options, guidance.budget)
-    request = _request(options, budget, views, guidance, like)
+    request = _request(options, budget, views, guidance, claims, like)
     if not force and (done := peek(out, MATERIAL)) and done.same_request(request):
         checkpoint.checkpoint_path(out).unlink(missing_ok=True)
         return DistillResult(budget.steps, 0, math.nan, True)
@@ -399,7 +399,9 @@ def chosen_device(options: DistillOptions) -> torch.device:
     return device
 
 
-def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Guidance, like: Like | None) -> Provenance:
+def _request(
+    options: DistillOptions, budget: Budget, views: Views, guidance: Guidance, claims: list[Claim], like: Like | None
+) -> Provenance:
     chosen = plain_options(options) | dataclasses.asdict(budget)
     if guidance.weights:
         chosen |= plain_options(guidance.weights)
@@ -408,7 +410,8 @@ def _request(options: DistillOptions, budget: Budget, views: Views, guidance: Gu
         del chosen[known]
     inputs = {"conditions": views.digest, "prep": views.prep, **guidance.inputs}
     inputs |= {} if like is None else {"like": like.digest}
-    extra = {"prompt": options.prompt, "guidance": guidance.identity, "environments": views.environments}
+    parts = [{"name": claim.name, "prompt": claim.prompt} for claim in claims]
+    extra = {"prompt": options.prompt, "parts": parts, "guidance": guidance.identity, "environments": views.environments}
     return Provenance(chosen, options.seed, inputs, extra)
 
 

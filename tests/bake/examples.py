@@ -176,6 +176,7 @@ def save_material(
         "size": np.array([64, 64], "i4"),
     }
     extra = {"recipe": recipe.to_json(), "residual": residual.config_dict()}
-    extra |= {"prompt": "a thing", "guidance": {"name": "none"}, "environments": []}
+    extra |= {"prompt": "a thing", "parts": [{"name": "seat", "prompt": "velvet"}]}
+    extra |= {"guidance": {"name": "none"}, "environments": []}
     save_npz(path, MATERIAL, arrays, Provenance({}, 5, {"prep": sha256_file(prep)}, extra))
     return path

@@ -71,6 +71,8 @@ def test_all_files_are_there_and_the_manifest_knows_their_hashes(constant_asset:
     assert {path.name for path in folder.iterdir()} == {*files, "bake.json", "run.json"}
     assert provenance.inputs["prep"] == sha256_file(constant_asset / "prep.npz") == files["mesh.npz"]
     assert (provenance.seed, provenance.extra["prompt"]) == (5, "a thing")
+    assert provenance.extra["parts"] == [{"name": "seat", "prompt": "velvet"}]
+    assert "seat: velvet" in (folder / "report.html").read_text()
     assert provenance.extra["unseen"] == pytest.approx(1 / 6, abs=1e-3)  # the bottom
     assert provenance.extra["coverage"] == pytest.approx(0.96**2 * 2 / 3, abs=0.01)
 

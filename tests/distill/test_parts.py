@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from click.testing import CliRunner
 
+from dreammat_cli.main import cli
 from stages.asset.parts import LabelledPart
 from stages.core.artifact import load_npz
 from stages.core.errors import InputError
@@ -142,3 +144,27 @@ def test_a_known_material_reads_no_words(folder: Path) -> None:
     options = DistillOptions(guidance="reference", reference=folder, parts=(("upper", "gold"),))
     with pytest.raises(InputError, match="--part with --guidance reference: it reads no words"):
         distill(folder / "conditions", folder / "known.npz", options)
+
+
+def test_what_is_understood_of_parts_is_shown(folder: Path) -> None:
+    """With their coats, and who has what two claim, where the conditions are there to tell."""
+    words = ["--prompt", "walnut", "--part", "upper", "oak", "--part", "u*", "navy velvet with a brass top", "--explain"]
+    told = CliRunner().invoke(cli, ["distill", str(folder / "conditions"), "-o", "m.npz", *words]).output
+    rows = [[cell.strip() for cell in line.split("  ") if cell][:2] for line in told.splitlines()]
+    assert rows[1:] == [
+        ["walnut", "all that is no part"], ["oak", "part upper"], ["navy velvet", "part u*"],
+        ["brass", "part u*, highest 50 % (top)"],
+        ["part upper: all of it is navy velvet with a brass top by the later --part u*"],
+    ]  # fmt: skip
+    unknown = CliRunner().invoke(cli, ["distill", str(folder / "none"), "-o", "m.npz", *words])
+    assert unknown.exit_code == 0 and unknown.output == told[: told.index("part upper: all")]
+
+
+def test_run_looks_for_parts_before_it_traces_light(tmp_path: Path) -> None:
+    """Options of a stage are quoted as in a shell."""
+    (tmp_path / "two.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nusemtl cloth\nf 1 2 3\nusemtl wood\nf 1 2 4\n")
+    options = "--part cloth 'navy velvet' --part \"sofa bed\" oak"
+    words = ["run", tmp_path / "two.obj", "--prompt", "oak", "-o", tmp_path / "out", "-q", "--with", "distill", options]
+    error = CliRunner().invoke(cli, list(map(str, words))).exception
+    assert str(error) == "--part 'sofa bed': there is none of this name; expected two, cloth, wood, #4"
+    assert [path.name for path in (tmp_path / "out").iterdir() if path.suffix != ".json"] == ["prep.npz"]
