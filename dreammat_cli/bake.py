@@ -14,8 +14,9 @@ DEFAULT = defaults(BakeOptions)
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.argument("material", type=INPUT, metavar="MATERIAL.npz")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="The asset folder to write.")
-@click.option("--size", type=click.Choice(SIZES), default=DEFAULT["size"], show_default=True, metavar="TEXELS",
-              help=f"Texture size: {', '.join(map(str, SIZES))}.")
+@click.option("--size", type=click.Choice(SIZES), default=DEFAULT["size"], metavar="TEXELS",
+              help=f"Texture size: {', '.join(map(str, SIZES))}.  [default: 2048; of several texture sets, by their share of "
+                   "the surface]")
 @click.option("--supersample", type=click.IntRange(1, 8), default=DEFAULT["supersample"], show_default=True,
               metavar="N", help="N x N samples in texels that borders run through; one in others.")
 @click.option("--relief", type=click.FloatRange(0, 2), default=DEFAULT["relief"], show_default=True, metavar="X",

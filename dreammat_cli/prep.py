@@ -29,6 +29,8 @@ DEFAULT = defaults(PrepOptions)
                    "without texels charts in free space, or always make new ones.")
 @click.option("--own-instances", is_flag=True,
               help="Texels for each place that a mesh stands in, in new UVs, instead of one texture for all of them.")
+@click.option("--textures", type=click.Choice(["auto", "one", "slots", "udim"]), default=DEFAULT["textures"], show_default=True,
+              help="Texture sets: those that the UVs are laid out for, one for all, one for each material slot, or UDIM tiles.")
 @click.option("--unwrap-seconds", type=click.FloatRange(0), default=DEFAULT["unwrap_seconds"], show_default=True,
               metavar="SECONDS", help="Time that xatlas may take before simpler charts are made.")
 @click.option("--unwrap-triangles", type=click.IntRange(0), default=DEFAULT["unwrap_triangles"], show_default=True,

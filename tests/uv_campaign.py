@@ -137,22 +137,40 @@ def on_the_edges() -> Soup:
     return ball()
 
 
+def of_slots(count: int = 6) -> Soup:
+    """A helmet: parts of several materials, each with the whole square for itself."""
+    soups = [at(half, (0.03, 0.03), (0.94, 0.94)) for half in balls(count)]
+    return together(*soups)
+
+
+def of_tiles(count: int = 4) -> Soup:
+    """UDIM: parts that fill tile after tile, no two alike; 1001, 1002, 1011, 1012."""
+    soups = [ball(8 + 2 * k, 16 + 4 * k, (2.2 * k, 0.3 * k, 0)) for k in range(count)]
+    return together(*(at(soup, (k % 2 + 0.04, k // 2 + 0.05), (0.9 - 0.06 * k, 0.9 - 0.1 * k)) for k, soup in enumerate(soups)))
+
+
+SLOTS = {"of_slots": 6}
+"""Ways whose quads are of so many material slots, one after the other."""
+
 WAYS: dict[str, Callable[[], Soup]] = {
     way.__name__: way
     for way in (
         one_tile_up, across_the_border, a_few_outside, without_area, slivers, mirrored, mirrored_at_the_seam, stacked,
         stacked_a_tile_away, panels, stacked_at_scales, twice_around, far_away, some_missing, on_the_edges,
+        of_slots, of_tiles,
     )
 }  # fmt: skip
 
 
-def write_obj(path: Path, soup: Soup) -> Path:
-    """Quads as an OBJ; those without UVs (NaN) have none."""
+def write_obj(path: Path, soup: Soup, slots: int = 1) -> Path:
+    """Quads as an OBJ; those without UVs (NaN) have none. Args: slots: materials, each of as many quads."""
     points, vertex = np.unique(np.round(soup[0].reshape(-1, 3), 9), axis=0, return_inverse=True)
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
     lines += [f"vt {u!r} {v!r}" for u, v in np.nan_to_num(soup[1]).reshape(-1, 2).astype(np.float32).astype(float).tolist()]
     corners, bare = vertex.reshape(-1, 4) + 1, np.isnan(soup[1]).any((1, 2))
     for k, quad in enumerate(corners.tolist()):
+        if slots > 1 and k % (len(corners) // slots) == 0:
+            lines.append(f"usemtl part {slots * k // len(corners)}")
         lines.append("f " + " ".join(f"{v}" if bare[k] else f"{v}/{4 * k + c + 1}" for c, v in enumerate(quad)))
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -193,7 +211,7 @@ def main() -> None:
     parser.add_argument("meshes", nargs="*", type=Path, help="further models")
     chosen = parser.parse_args()
     chosen.o.mkdir(parents=True, exist_ok=True)
-    meshes = [write_obj(chosen.o / f"{name}.obj", way()) for name, way in WAYS.items()] + chosen.meshes
+    meshes = [write_obj(chosen.o / f"{name}.obj", way(), SLOTS.get(name, 1)) for name, way in WAYS.items()] + chosen.meshes
     rows = []
     for mesh in meshes:
         if chosen.only and mesh.stem not in chosen.only:

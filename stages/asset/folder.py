@@ -8,6 +8,7 @@ from stages.core.artifact import Provenance, read_manifest, sha256_file
 from stages.core.errors import ArtifactError
 from stages.core.naming import identifier, unique
 from stages.core.schemas import ASSET
+from stages.core.texture_sets import texture_sets
 
 MODEL = "model.glb"
 
@@ -26,14 +27,18 @@ class Asset:
     sha256: str
 
     def stems(self) -> list[tuple[str, Look]]:
-        """The distinct sets of pictures, each under a file stem of its own; all slots share one in most assets."""
+        """The distinct sets of pictures, each under a file stem of its own; all slots share one in most assets.
+
+        A texture set goes by its name, else by that of the first material that shows it.
+        """
         distinct: list[Look] = []
         for look in self.model.looks:
             if all(look.pictures != other.pictures for other in distinct):
                 distinct.append(look)
         if len(distinct) == 1:
             return [(self.name, distinct[0])]
-        names = unique([identifier(look.name) for look in distinct])
+        named = {f"albedo{one.suffix}": one.name for one in texture_sets(self.provenance) if one.name}
+        names = unique([identifier(named.get(look.pictures["albedo"].name, look.name)).lstrip("_") for look in distinct])
         return [(f"{self.name}_{name}", look) for name, look in zip(names, distinct, strict=True)]
 
     def stem_of(self, look: Look) -> str:

@@ -30,11 +30,12 @@ REPEAT = 10497
 
 @dataclass(frozen=True)
 class Picture:
-    """An embedded picture: its row in the file's images, its encoded bytes, and ".png" or ".jpg"."""
+    """An embedded picture: its row in the file's images, its encoded bytes, ".png" or ".jpg", and its name there or ""."""
 
     row: int
     data: bytes
     suffix: str
+    name: str = ""
 
     def pixels(self) -> NDArray:
         """As stored, uint8 or uint16, (H, W, C). Raises: ArtifactError."""
@@ -172,7 +173,7 @@ def _array(entry: dict[str, Any], views: list[bytes]) -> NDArray:
 
 
 def _picture(row: int, image: dict[str, Any], views: list[bytes]) -> Picture:
-    return Picture(row, bytes(views[image["bufferView"]]), SUFFIXES[image["mimeType"]])
+    return Picture(row, bytes(views[image["bufferView"]]), SUFFIXES[image["mimeType"]], image.get("name", ""))
 
 
 def _look(material: dict[str, Any], root: dict[str, Any], pictures: list[Picture]) -> Look:

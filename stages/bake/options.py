@@ -13,7 +13,7 @@ SIZES = (512, 1024, 2048, 4096, 8192)
 class BakeOptions:
     """How textures are baked."""
 
-    size: int = 2048  # texels along each edge, one of SIZES
+    size: int | None = None  # texels along each edge, one of SIZES; None: 2048, of several sets by their share of the surface
     supersample: int = 2  # samples along the edge of a texel that differs from its neighbours, averaged; of others one
     preview_size: int = 320  # pixels along each edge of one view of preview.png
     occlusion_rays: int = 128  # of each point whose ambient occlusion is traced
@@ -22,7 +22,7 @@ class BakeOptions:
 
     def __post_init__(self) -> None:
         """Raises: InputError that names the option, what was found and what is expected."""
-        if self.size not in SIZES:
+        if self.size is not None and self.size not in SIZES:
             raise InputError(f"size: {self.size} texels; expected one of {', '.join(map(str, SIZES))}")
         if not 1 <= self.supersample <= 8:
             raise InputError(f"supersample: {self.supersample}; expected 1 to 8 samples along each edge of a texel")

@@ -5,6 +5,7 @@ import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +24,15 @@ from stages.asset.textures import write_textures
 from stages.asset.traced import baked_bumps, traced_scene, world_frames
 from stages.asset.wavefront import write_obj
 from stages.bake.checks import Facts, islands
+from stages.bake.evaluate import evaluate
 from stages.bake.fill import fill_unseen, pad
 from stages.bake.occlusion import occlusion_map
 from stages.bake.options import BakeOptions
 from stages.bake.page import report_page
 from stages.bake.preview import Look, contact_sheet
-from stages.bake.raster import Layout, Surface, touched_texels
+from stages.bake.raster import Layout, Surface, joined, touched_texels
 from stages.bake.relief import relief_normals
+from stages.bake.sizes import block, means, sized
 from stages.bake.studio import write_studio
 from stages.bake.texels import Texels
 from stages.bake.visibility import Patches, Views, is_open, patches, seen_elsewhere, seen_points
@@ -62,6 +65,9 @@ from stages.material.residual import combined
 SAID_OF_OPTIONS = ("quality", "steps")
 """Options of `distill` that bake.json repeats."""
 
+STREWN, FEWEST = 1 << 17, 1 << 12
+"""Points on what the other texture sets show, of all sets together, and of each at least."""
+
 
 @dataclass(frozen=True)
 class BakeResult:
@@ -78,7 +84,8 @@ class Subject:
     """The mesh, ready to trace and to bake.
 
     open: whether the backs of its triangles can be seen. set: the texture set that is baked, triangles: (F,) whether they show
-    it, layout: what lies on its texture, touched: (size, size) the surface point of each of its texels.
+    it, layout: what lies on its texture, touched: (size, size) the surface point of each of its texels. block: texels along an
+    edge of the blocks whose means pictures show.
     """
 
     mesh: Artifact
@@ -88,6 +95,7 @@ class Subject:
     layout: Layout
     touched: Surface
     set: TextureSet = ONE_SET
+    block: int = 1
 
     @staticmethod
     def of(prep: Path, mesh: Artifact, size: int) -> "Subject":
@@ -96,8 +104,12 @@ class Subject:
 
     def points(self, surface: Surface) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """World positions and interpolated normals of surface points, (N, 3) each."""
-        corners = self.mesh["vertices"][self.mesh["triangles"]]
-        return surface.interpolate(corners), surface.interpolate(self.mesh["normals"])
+        return surface.interpolate(self.corners), surface.interpolate(self.mesh["normals"])
+
+    @cached_property
+    def corners(self) -> NDArray[np.float32]:
+        """World positions of the triangles' corners, (F, 3, 3)."""
+        return self.mesh["vertices"][self.mesh["triangles"]]
 
 
 def subjects(prep: Path, mesh: Artifact, sets: list[TextureSet]) -> Iterator[Subject]:
@@ -115,7 +127,7 @@ def subjects(prep: Path, mesh: Artifact, sets: list[TextureSet]) -> Iterator[Sub
         if not signed_area(layout.uv).any() or not (touched.triangle >= 0).any():
             named = f" of set {chosen.name}" if chosen.name else ""
             raise ArtifactError(f"{prep}: its UVs cover no texel of {chosen.size}{named}; make it again with new UVs")
-        yield Subject(mesh, scene, open_mesh, mine, layout, touched, chosen)
+        yield Subject(mesh, scene, open_mesh, mine, layout, touched, chosen, block(sets))
 
 
 def bake(
@@ -144,7 +156,7 @@ def bake(
         return BakeResult(out, True, sorted(read_manifest(out, ASSET)[1]), known.extra)
     learnt = LearntMaterial.of(material, made, options.library)
     with run_log(out) as measured:
-        sets = [replace(chosen, size=options.size) for chosen in texture_sets(mesh.provenance)]
+        sets = sized(texture_sets(mesh.provenance), options.size)
         open_folder(out, prep)
         shown, covered = list[Shown](), list[Covered]()
         for subject in subjects(prep, mesh, sets):
@@ -206,7 +218,7 @@ def bake_maps(
     texels = Texels(learnt, corners, mesh["normals"], label, subject.layout, subject.touched)
     residual = texels.residual()
     groups = patches(subject.touched, mesh["charts"])
-    unseen = mend_unseen(subject, groups, views_of(made), residual, progress)
+    unseen = mend_unseen(subject, groups, views_of(made), learnt, residual, progress)
     maps = texels.recipe(options.supersample, groups, progress)
     values = combined(*(torch.from_numpy(a[on_chart]) for a in (maps[..., :5], residual)))
     maps[on_chart, :5] = values.numpy()
@@ -253,7 +265,8 @@ def write_set(out: Path, subject: Subject, maps: Maps, progress: Progress) -> Sh
     progress("files", 0, 1)
     files = write_textures(out, maps, subject.mesh.provenance.extra["source_format"] == "obj", subject.set)
     facts = Facts.of(maps.material, subject.touched, islands(subject.mesh), subject.set.share)
-    return Shown(subject.set, files, maps.material, maps.normal, maps.occlusion is not None, facts)
+    normal = None if maps.normal is None else means(maps.normal, subject.block)
+    return Shown(subject.set, files, means(maps.material, subject.block), normal, maps.occlusion is not None, facts)
 
 
 def shown_look(subject: Subject, shown: list[Shown]) -> Look:
@@ -264,12 +277,14 @@ def shown_look(subject: Subject, shown: list[Shown]) -> Look:
 
 
 def mend_unseen(
-    subject: Subject, groups: Patches, views: Views, residual: NDArray[np.float32], progress: Progress
+    subject: Subject, groups: Patches, views: Views, learnt: LearntMaterial, residual: NDArray[np.float32], progress: Progress
 ) -> int:
     """Fill, in place, what was learnt at texels that no view saw from seen surface nearby; all stay when none was seen.
 
+    What other texture sets show is nearby too.
+
     Args:
-        groups: the texels, by which sight is decided. residual: (H, W, 5).
+        groups: the texels, by which sight is decided. residual: (H, W, 5) of the texels.
     Returns:
         how many texels on charts no view saw.
     """
@@ -281,13 +296,29 @@ def mend_unseen(
     if subject.mesh.provenance.extra["shared_texels"]:
         seen |= seen_elsewhere(subject.scene, subject.layout, subject.mesh["charts"], groups, views, subject.open)
     texel_seen = seen[groups.of_texel]
-    if seen.any() and not seen.all():
-        progress("filling", 0, 1)
-        values = residual[on_chart]
-        known, wanted = subject.points(first[seen]), subject.points(surface[~texel_seen])
-        values[~texel_seen] = fill_unseen(known, groups.mean(values)[seen], wanted)
+    if seen.all():
+        return 0
+    progress("filling", 0, 1)
+    values, others = residual[on_chart], seen_of_others(subject, views)
+    known = subject.points(joined([first[seen], others]))
+    of_known = np.concatenate([groups.mean(values)[seen], evaluate(learnt.residual, others.interpolate(subject.corners))])
+    if len(of_known):
+        values[~texel_seen] = fill_unseen(known, of_known, subject.points(surface[~texel_seen]))
         residual[on_chart] = values
     return int((~texel_seen).sum())
+
+
+def seen_of_others(subject: Subject, views: Views) -> Surface:
+    """Points, strewn evenly, of surface that other texture sets show and a view saw."""
+    a, b, c = (subject.corners[:, k].astype(np.float64) for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    area[subject.triangles] = 0
+    if not area.any():
+        return Surface(np.zeros(0, np.int32), np.zeros((0, 2), np.float32))
+    rng = np.random.default_rng(0)
+    face = rng.choice(len(area), max(STREWN // len(texture_sets(subject.mesh.provenance)), FEWEST), p=area / area.sum())
+    surface = Surface(face.astype(np.int32), rng.dirichlet((1, 1, 1), len(face))[:, :2].astype(np.float32))
+    return surface[np.flatnonzero(seen_points(subject.scene, surface, views, subject.open))]
 
 
 def views_of(made: Artifact) -> Views:

@@ -90,7 +90,7 @@ def seen_elsewhere(
     count = int(min(STREWN * len(groups.key) * max(area.sum(), 1.0), MOST_STREWN))
     face = rng.choice(len(uv), count, p=area / area.sum()).astype(np.int32)
     weights = rng.dirichlet((1, 1, 1), count)
-    found, theirs = Representatives(uv, charts).of(face, weights)
+    found, theirs = Representatives(uv, charts, np.zeros(len(uv), np.int32)).of(face, weights)
     place = np.einsum("pk,pkd->pd", theirs, layout.uv[found])
     column, row = np.floor(place % layout.size).astype(np.int64).clip(max=layout.size - 1).T
     key = _key(charts[found], row, column, layout.size)

@@ -17,6 +17,7 @@ from stages.conditions.options import ConditionsOptions
 from stages.conditions.predict import choose_quality
 from stages.core.artifact import (
     MANIFEST,
+    Artifact,
     Provenance,
     is_readable_exr,
     load_npz,
@@ -34,6 +35,7 @@ from stages.core.errors import InputError, NumericalError, OutputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import CAMERAS, CONDITIONS, PREP, SURVEY
 from stages.core.shading import KNOTS, Transport
+from stages.core.texture_sets import triangle_sets
 from stages.core.tiles import Representatives
 from stages.core.views import (
     SD,
@@ -98,8 +100,7 @@ def conditions(
         survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.occluded, label)
         save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None
-        shared = Representatives(mesh["uv"], mesh["charts"]) if mesh.provenance.extra["shared_texels"] else None
-        subject = Subject(scene, smooth, label, shared)
+        subject = Subject(scene, smooth, label, shared_texels(mesh))
         quality, expected = QUALITY[options.quality], None
         if options.error:
             progress("choosing rays", 0, 1)
@@ -297,6 +298,13 @@ def shared_labels(subject: Subject) -> list[tuple[int, int, float]]:
     pairs, row = np.unique(np.stack([own[other], theirs[other]], 1), axis=0, return_inverse=True)
     share = np.bincount(row.reshape(-1), area[other], len(pairs)) / np.maximum(whole[pairs[:, 0]], np.finfo(float).tiny)
     return [(int(a), int(b), round(float(s), 6)) for (a, b), s in zip(pairs, share, strict=True)]
+
+
+def shared_texels(mesh: Artifact) -> Representatives | None:
+    """By what texels are shared, None where none is."""
+    if not mesh.provenance.extra["shared_texels"]:
+        return None
+    return Representatives(mesh["uv"], mesh["charts"], triangle_sets(mesh))
 
 
 def check_finite(transport: Transport, environment: str, view: int, seed: int) -> None:

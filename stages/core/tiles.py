@@ -84,10 +84,10 @@ class Representatives:
     """Finds the point of the surface that represents what another shows.
 
     Args:
-        uv: (F, 3, 2), v up. charts: (F,), as for `drawn`.
+        uv: (F, 3, 2), v up. charts: (F,), as for `drawn`. sets: (F,) the texture that each triangle shows, from 0.
     """
 
-    def __init__(self, uv: NDArray, charts: NDArray[np.int32]) -> None:
+    def __init__(self, uv: NDArray, charts: NDArray[np.int32], sets: NDArray[np.int32]) -> None:
         self._uv, self._flat, self._area = uv.astype(np.float64), flat(uv), np.abs(signed_area(uv))
         self._low, count = tiles(uv)
         self._one_tile = (count == 1).all(1)
@@ -95,8 +95,11 @@ class Representatives:
         corners = self._drawn.corners
         extent = np.prod(np.minimum(np.ptp(corners, axis=1), 1), axis=1).sum()
         cells = np.sqrt((4 * len(corners) + 1e6) / max(extent, 1e-9))
-        self._cells = int(np.clip(min(cells, np.sqrt(len(corners))), 1, MOST_CELLS))
-        self._start, self._content = _gridded(corners, ~self._flat[self._drawn.face], self._cells)
+        textures = int(sets.max(initial=0)) + 1
+        self._cells = int(np.clip(min(cells, np.sqrt(len(corners))), 1, max(MOST_CELLS / np.sqrt(textures), 1)))
+        self._first = sets.astype(np.int64) * self._cells**2  # cell of each triangle's texture
+        usable, first = ~self._flat[self._drawn.face], self._first[self._drawn.face]
+        self._start, self._content = _gridded(corners, usable, self._cells, first, textures)
 
     def of(self, triangle: NDArray[np.int32], barycentric: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
         """The representatives of P points of the surface; a point that nothing represents stands for itself.
@@ -110,7 +113,8 @@ class Representatives:
         uv -= np.where(self._one_tile[triangle, None], self._low[triangle], np.floor(uv))
         found, weights = triangle.astype(np.int32).copy(), np.array(barycentric, np.float64)
         grid = self._cells, self._start, self._content
-        _represent(uv, self._flat[triangle], grid, self._drawn.corners, self._drawn.face, found, weights)
+        flat, first = self._flat[triangle], self._first[triangle]
+        _represent(uv, flat, first, grid, self._drawn.corners, self._drawn.face, found, weights)
         return found, weights
 
     def scale(self, size: NDArray[np.float64], triangle: NDArray[np.int32], found: NDArray[np.int32]) -> NDArray[np.float32]:
@@ -126,12 +130,14 @@ class Representatives:
 
 
 def _gridded(
-    corners: NDArray[np.float64], usable: NDArray[np.bool_], cells: int
+    corners: NDArray[np.float64], usable: NDArray[np.bool_], cells: int, first: NDArray[np.int64], textures: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Triangles by the cells that their boxes meet.
 
+    Args:
+        first: the first cell of each triangle's texture.
     Returns:
-        (cells² + 1,) where each cell's triangles start in the second, which holds them in order.
+        (textures cells² + 1,) where each cell's triangles start in the second, which holds them in order.
     """
     low, high = (np.clip(np.floor(edge * cells), 0, cells - 1).astype(np.int64) for edge in (corners.min(1), corners.max(1)))
     width, height = (high - low + 1).T
@@ -139,8 +145,8 @@ def _gridded(
     owner = np.repeat(np.arange(len(corners), dtype=np.int32), count)
     number = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
     column, row = low[owner, 0] + number % width[owner], low[owner, 1] + number // width[owner]
-    cell = row * cells + column
-    start = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=cells * cells))])
+    cell = first[owner] + row * cells + column
+    start = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=textures * cells * cells))])
     return start, owner[np.argsort(cell, kind="stable")]
 
 
@@ -172,14 +178,15 @@ def _nearest(t, x, y):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _represent(uv, flat, grid, corners, face, found, weights):  # type: ignore[no-untyped-def]
+def _represent(uv, flat, first, grid, corners, face, found, weights):  # type: ignore[no-untyped-def]
     """Replace each point by the first drawn that covers it; one of a face without area also by the nearest beside it."""
     cells, start, content = grid
     for i in range(len(uv)):
         x, y = uv[i, 0], uv[i, 1]
         column, row = min(max(int(x * cells), 0), cells - 1), min(max(int(y * cells), 0), cells - 1)
         nearest = BESIDE * BESIDE
-        for k in range(start[row * cells + column], start[row * cells + column + 1]):
+        cell = first[i] + row * cells + column
+        for k in range(start[cell], start[cell + 1]):
             d = content[k]
             w0, w1, w2 = _weights(corners[d], x, y)
             if min(w0, w1, w2) >= INSIDE:

@@ -5,14 +5,16 @@ texel: mirrored and stacked islands are what artists mean. They are not kept whe
 texture would be each place's own.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.tiles import Representatives, drawn, flat, signed_area, tiles
+from stages.prep.source import rows_of
 from stages.prep.topology import face_components
-from stages.prep.uv import covered, uv_charts, uv_vertices
+from stages.prep.uv import covered, uv_vertices
 
 TEXTURED = 0.98
 """Least share of the surface that must have texels."""
@@ -56,11 +58,11 @@ def sound(uv: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.where(good[:, None, None], uv, np.float32(np.nan))
 
 
-def unusable(triangles: NDArray, uv: NDArray, area: NDArray) -> str | None:
+def unusable(triangles: NDArray, uv: NDArray, area: NDArray, sets: NDArray) -> str | None:
     """Why UVs cannot be kept, or None.
 
     Args:
-        triangles: (F, 3). uv: (F, 3, 2), NaN where missing. area: (F,) of the faces in space.
+        triangles: (F, 3). uv: (F, 3, 2), NaN where missing. area: (F,) of the faces in space. sets: (F,) texture of each.
     """
     uv = sound(uv)
     finite = np.isfinite(uv).all((1, 2))
@@ -72,22 +74,24 @@ def unusable(triangles: NDArray, uv: NDArray, area: NDArray) -> str | None:
         return f"{found}: {_percent(1 - area[textured].sum() / area.sum())} of the surface would have no texels"
     if tiles(uv[finite])[1].prod(1).sum() > COPIES * len(uv) + 100_000:
         return "faces go through many tiles: little of the texture would be a place's own"
-    triangles, uv, area = triangles[textured], uv[textured], area[textured]
-    often = _tiled(uv_charts(triangles, uv), uv, area)
+    triangles, uv, area, sets = triangles[textured], uv[textured], area[textured], sets[textured]
+    often = _tiled(set_charts(triangles, uv, sets), uv, area)
     if often > OFTEN:
         return f"islands go through {often:.0f} tiles each: little of the texture would be a place's own"
-    times = _times(uv)
-    if times > STACKED and not _alike(triangles, uv, area):
+    times = _times(uv, sets)
+    if times > STACKED and not _alike(triangles, uv, area, sets):
         return f"islands of many sizes cover the same texels {times:.0f} times: little of the texture would be a place's own"
     return None
 
 
-def keep(triangles: NDArray, uv: NDArray, area: NDArray, missing: NDArray, new: NDArray | None = None) -> Kept:
+def keep(
+    triangles: NDArray, uv: NDArray, area: NDArray, sets: NDArray, missing: NDArray, new: NDArray | None = None
+) -> Kept:
     """Charts of a layout that is kept, and what is unusual of it.
 
     Args:
-        triangles: (F, 3). uv: (F, 3, 2) finite. area: (F,) in space. missing: (F,) faces without UVs in the file. new: (F,)
-        faces that were given charts of their own.
+        triangles: (F, 3). uv: (F, 3, 2) finite. area: (F,) in space. sets: (F,) texture of each. missing: (F,) faces without
+        UVs in the file. new: (F,) faces that were given charts of their own.
     """
     told, lost = ["kept"], flat(uv) & ~missing
     if new is not None and new.any():
@@ -101,16 +105,16 @@ def keep(triangles: NDArray, uv: NDArray, area: NDArray, missing: NDArray, new: 
         told.append(f"{_faces(lost)} without area in UV, each shows the texel that it touches")
     if missing.any():
         told.append(f"{_faces(missing)} without UVs, each shows a neighbour's texel")
-    shared = _shared(uv)
+    shared = _shared(uv, sets)
     if shared < SHARED:
-        return Kept(uv_charts(triangles, uv), bool(lost.any() or missing.any()), told)
+        return Kept(set_charts(triangles, uv, sets), bool(lost.any() or missing.any()), told)
     told.append(f"{_percent(shared)} of the texels are shared by stacked, mirrored or repeated islands")
-    return Kept(sharing(triangles, uv, area), True, told)
+    return Kept(sharing(triangles, uv, area, sets), True, told)
 
 
-def sharing(triangles: NDArray, uv: NDArray, area: NDArray) -> NDArray[np.int32]:
+def sharing(triangles: NDArray, uv: NDArray, area: NDArray, sets: NDArray) -> NDArray[np.int32]:
     """Charts (F,) of a layout whose islands share texels; of those that do the largest in space is the lowest."""
-    return _ranked(_one_sided(triangles, uv), area)
+    return _ranked(_one_sided(triangles, uv, sets), area)
 
 
 def with_neighbours(uv: NDArray[np.float32], triangles: NDArray, polygon: NDArray) -> NDArray[np.float32]:
@@ -146,36 +150,42 @@ def _tiled(chart: NDArray, uv: NDArray, area: NDArray) -> float:
     return float(np.average(np.maximum(high - low, 1.0).prod(1)[chart], weights=area))
 
 
-def _times(uv: NDArray) -> float:
+def _times(uv: NDArray, sets: NDArray) -> float:
     """How often the covered texels are covered."""
-    once = float((_cover(uv) > 0).mean())
+    once = sum(float((cover > 0).mean()) for cover in _covers(uv, sets))
     return float(np.abs(signed_area(uv)).sum()) / once if once else 1.0
 
 
-def _shared(uv: NDArray) -> float:
+def _shared(uv: NDArray, sets: NDArray) -> float:
     """Share of the covered texels that more than one place claims."""
-    cover = _cover(uv)
-    return float((cover > 1).sum()) / max(int((cover > 0).sum()), 1)
+    counts = [((cover > 1).sum(), (cover > 0).sum()) for cover in _covers(uv, sets)]
+    return float(sum(more for more, _ in counts)) / max(int(sum(once for _, once in counts)), 1)
 
 
-def _cover(uv: NDArray) -> NDArray[np.int32]:
-    """How many faces cover each texel."""
-    return covered(drawn(uv, np.zeros(len(uv), np.int32)).corners)
+def _covers(uv: NDArray, sets: NDArray) -> Iterator[NDArray[np.int32]]:
+    """How many faces cover each texel, of one texture after the other."""
+    count = int(sets.max(initial=0)) + 1
+    for mine in rows_of(sets, count):
+        yield covered(drawn(uv[mine], np.zeros(len(mine), np.int32)).corners, count)
 
 
-def _alike(triangles: NDArray, uv: NDArray, area: NDArray) -> bool:
+def _alike(triangles: NDArray, uv: NDArray, area: NDArray, sets: NDArray) -> bool:
     """Whether islands that share texels are of one size."""
-    found = Representatives(uv, sharing(triangles, uv, area))
+    found = Representatives(uv, sharing(triangles, uv, area, sets), sets)
     rng = np.random.default_rng(0)
     face = rng.choice(len(uv), SAMPLES, p=area / area.sum()).astype(np.int32)
     scale = found.scale(area, face, found.of(face, rng.dirichlet((1, 1, 1), SAMPLES))[0])
     return bool((np.abs(np.log(scale)) < np.log(SCALE)).mean() >= ALIKE)
 
 
-def _one_sided(triangles: NDArray, uv: NDArray) -> NDArray[np.int32]:
-    """Charts (F,) that lie one way up: a mirrored half is another chart than what it mirrors."""
-    side = signed_area(uv) < 0
-    return face_components(2 * uv_vertices(triangles, uv) + side[:, None])
+def set_charts(triangles: NDArray, uv: NDArray, sets: NDArray) -> NDArray[np.int32]:
+    """`uv_charts` (F,), each on one texture."""
+    return face_components((int(sets.max(initial=0)) + 1) * uv_vertices(triangles, uv) + sets[:, None])
+
+
+def _one_sided(triangles: NDArray, uv: NDArray, sets: NDArray) -> NDArray[np.int32]:
+    """The same, one way up: a mirrored half is another chart than what it mirrors."""
+    return set_charts(triangles, uv, 2 * sets + (signed_area(uv) < 0))
 
 
 def _ranked(chart: NDArray, area: NDArray) -> NDArray[np.int32]:

@@ -16,6 +16,8 @@ class PrepOptions:
     uv: "auto" keeps the source's UVs where they give texels to the surface, "keep" insists on them, "mend" also gives the faces
         without texels charts in free space, "new" always makes new ones.
     own_instances: a mesh that stands in several places gets texels for each of them, in new UVs.
+    textures: "auto" keeps the texture sets that the UVs are laid out for, "one" is one atlas, "slots" a set for each material
+        slot, "udim" one for each UDIM tile.
     unwrap_seconds: after this, xatlas is stopped and the charts are made by direction of the normal instead.
     unwrap_triangles: a larger mesh does not try xatlas, which there takes minutes and packs no denser.
     """
@@ -27,5 +29,6 @@ class PrepOptions:
     weld_tolerance: float = 1e-6
     uv: str = "auto"
     own_instances: bool = False
+    textures: str = "auto"
     unwrap_seconds: float = 60.0
     unwrap_triangles: int = 50_000

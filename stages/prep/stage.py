@@ -12,11 +12,10 @@ from stages.core.artifact import Provenance, peek, plain_options, run_log, save_
 from stages.core.errors import InputError
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
-from stages.core.texture_sets import TextureSet
 from stages.core.tiles import flat
 from stages.prep.gltf_file import companions
 from stages.prep.instances import firsts, like_the_first, told, with_instances
-from stages.prep.layout import Kept, keep, sharing, sound, unusable, with_neighbours
+from stages.prep.layout import Kept, keep, set_charts, sharing, sound, unusable, with_neighbours
 from stages.prep.measure import topology
 from stages.prep.mend import mended
 from stages.prep.normals import authored, face_normals, shading_normals
@@ -30,10 +29,11 @@ from stages.prep.read_ply import read_ply
 from stages.prep.read_stl import read_stl
 from stages.prep.read_usd import layers, read_usd
 from stages.prep.repair import Working, repair
-from stages.prep.source import Source, nothing_passed_on
+from stages.prep.sets import NO_NUMBERS, Divided, by_slots, divided
+from stages.prep.source import Source, nothing_passed_on, rows_of
 from stages.prep.topology import components, edges
 from stages.prep.unwrap import unwrap
-from stages.prep.uv import loop_uvs, signed_area, stretch, uv_charts
+from stages.prep.uv import loop_uvs, signed_area, stretch
 
 READERS: dict[str, Callable[[Path], Source]] = {
     ".obj": read_obj, ".ply": read_ply, ".stl": read_stl, ".off": read_off, ".glb": read_gltf, ".gltf": read_gltf,
@@ -71,16 +71,16 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
         working = repair(source, options.up, options.weld_tolerance, mesh)
         normals, findings = oriented(source, working, options.crease_angle)
         progress("unwrap", 2, 4)
-        source, layout = _with_bakeable_uv(source, working, options, mesh)
-        loop_uv, way = _texture(source, working, options, layout["unusable_uv"], mesh)
+        source, sets, layout = _with_bakeable_uv(source, working, options, mesh)
+        loop_uv, way = _texture(source, working, sets, options, layout["unusable_uv"], mesh)
         kept, uv = layout["unusable_uv"] is None, loop_uv[working.loops]
-        found = _charts(source, working, uv, layout["unusable_uv"])
-        chart, way["uv"] = found.chart, "; ".join(found.told)
+        found = _charts(source, working, sets, uv, layout["unusable_uv"])
+        chart, way["uv"], way["texture_sets"] = found.chart, "; ".join(found.told), sets.told
         measured = topology(working.vertices, working.triangles)
         findings = _findings(source, working, findings, layout | way) | measured | {
             "charts": int(chart.max()) + 1,
             "texel_density": _texel_density(working, uv, options.texture_size),
-            "texture_filled": round(float(np.abs(signed_area(uv)).sum()), 3),
+            "texture_filled": round(float(np.abs(signed_area(uv)).sum()) / len(sets.sets), 3),
             "stretch": round(stretch(working.vertices[working.triangles], uv), 3),
         }
         progress("write", 3, 4)
@@ -90,12 +90,13 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
             "uv_kept": kept,
             "shared_texels": found.shared,
             "parts": [asdict(part) for part in source.parts],
-            "sets": [TextureSet(slots=tuple(dict.fromkeys(part.material for part in source.parts))).to_json()],
+            "sets": [one.to_json() for one in sets.sets],
             "groups": source.groups,
             "passed_on": source.passed_on if kept else nothing_passed_on(),
             "findings": findings,
         }
         arrays = _arrays(source, working, normals, uv, chart, loop_uv) | _extras(source, kept)
+        arrays["face_set"] = sets.of_face
         save_npz(out, PREP, arrays, Provenance(request.options, None, request.inputs, extra))
         progress("write", 4, 4)
     return PrepResult(False, findings)
@@ -134,73 +135,99 @@ def oriented(source: Source, working: Working, crease_angle: float) -> tuple[NDA
 
 def _with_bakeable_uv(
     source: Source, working: Working, options: PrepOptions, path: Path
-) -> tuple[Source, dict[str, Any]]:
-    """The source with the first of its UV sets that can be baked, and which; or as it is, and what is wrong with it.
+) -> tuple[Source, Divided, dict[str, Any]]:
+    """The source with the first of its UV sets that can be baked, its texture sets, and which UVs they are; or the source as it
+    is, and what is wrong with its UVs.
 
-    Raises: InputError where a set must be kept and none can be.
+    Raises: InputError where a UV set must be kept and none can be.
     """
-    if options.uv == "new":
-        return source, {"unusable_uv": "new ones asked for", "uv_set": None}
-    if options.own_instances and any(part.instance_of >= 0 for part in with_instances(source).parts):
-        return source, {"unusable_uv": "instances are to have texels of their own", "uv_set": None}
     _, area = face_normals(working.vertices, working.triangles)
-    problems, own = [], firsts(source, working.loops)
-    for number, candidate in enumerate(source.by_uv_set()):
-        problems.append(unusable(working.triangles[own], loop_uvs(candidate)[working.loops[own]], area[own]))
-        if problems[-1] is None:
-            return candidate, {"unusable_uv": None, "uv_set": number}
+    polygon, own, problems = polygons_of(source, working), firsts(source, working.loops), list[str]()
+    refused = refused_uvs(source, options)
+    for number, candidate in enumerate([] if refused else source.by_uv_set()):
+        uv = sound(loop_uvs(candidate)[working.loops])
+        sets = divided(candidate, working.triangles, uv, area, polygon, options.textures)
+        of_triangle = None if sets is None else sets.of_face[polygon]
+        problem = NO_NUMBERS if of_triangle is None else unusable(working.triangles[own], uv[own], area[own], of_triangle[own])
+        if sets is not None and problem is None:
+            return candidate, sets, {"unusable_uv": None, "uv_set": number}
+        problems.append(str(problem))
+    problem = refused or problems[0]
     if options.uv in ("keep", "mend"):
-        raise InputError(f"{path}: its UVs cannot be kept: {problems[0]}; mend them or let new ones be made")
-    return source, {"unusable_uv": problems[0], "uv_set": None}
+        raise InputError(f"{path}: its UVs cannot be kept: {problem}; mend them or let new ones be made")
+    if options.textures == "udim":
+        raise InputError(f"{path}: has no UDIM tiles: {problem}; lay it out in tiles 1001 and on, or choose other textures")
+    return source, by_slots(source, area, polygon, options.textures), {"unusable_uv": problem, "uv_set": None}
+
+
+def refused_uvs(source: Source, options: PrepOptions) -> str | None:
+    """Why a source's UVs are not wanted, or None."""
+    if options.uv == "new":
+        return "new ones asked for"
+    if options.own_instances and any(part.instance_of >= 0 for part in with_instances(source).parts):
+        return "instances are to have texels of their own"
+    return None
+
+
+def polygons_of(source: Source, working: Working) -> NDArray[np.int64]:
+    """The source face of each triangle, (F,)."""
+    return np.searchsorted(source.loop_start, working.loops[:, 0], "right") - 1
 
 
 def _texture(
-    source: Source, working: Working, options: PrepOptions, problem: str | None, path: Path
+    source: Source, working: Working, sets: Divided, options: PrepOptions, problem: str | None, path: Path
 ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-    """UVs of all source loops (L, 2), the source's where nothing is wrong with them, and how they came about.
+    """UVs of all source loops (L, 2), the source's where nothing is wrong with them, and how they came about; each texture set
+    by itself.
 
     Raises: InputError where some are to be mended and there is no room.
     """
-    polygon = np.searchsorted(source.loop_start, working.loops[:, 0], "right") - 1
+    polygon = polygons_of(source, working)
+    mine = rows_of(sets.of_face[polygon], len(sets.sets))
     if problem is None:
         uv = loop_uvs(source)
         uv[working.loops] = sound(uv[working.loops])
-        if options.uv == "mend":
-            uv[working.loops] = _mended(uv[working.loops], working, polygon, path)
-        uv[working.loops] = with_neighbours(uv[working.loops], working.triangles, polygon)
+        for rows in mine:
+            loops, triangles = working.loops[rows], working.triangles[rows]
+            if options.uv == "mend":
+                uv[loops] = _mended(uv[loops], working.vertices, triangles, polygon[rows], path)
+            uv[loops] = with_neighbours(uv[loops], triangles, polygon[rows])
         return _everywhere(like_the_first(source, uv), working), {"unwrap": "kept", "gutter": None}
+    made, ways = np.full((len(source.loop_vertex), 2), np.nan, np.float32), list[tuple[str, int]]()
     own = firsts(source, working.loops)
-    seconds = options.unwrap_seconds if own.sum() <= options.unwrap_triangles else 0.0
-    layout = unwrap(
-        working.vertices, working.triangles[own], polygon[own], options.texture_size, options.padding, seconds
-    )  # fmt: skip
-    made = np.full((len(source.loop_vertex), 2), np.nan, np.float32)
-    made[working.loops[own]] = np.clip(layout.uv, 0, 1)
+    for rows in filter(len, (rows[own[rows]] for rows in mine)):
+        seconds = options.unwrap_seconds if len(rows) <= options.unwrap_triangles else 0.0
+        layout = unwrap(
+            working.vertices, working.triangles[rows], polygon[rows], options.texture_size, options.padding, seconds
+        )  # fmt: skip
+        made[working.loops[rows]] = np.clip(layout.uv, 0, 1)
+        ways.append((layout.method, layout.packing.gutter))
+    method = "; ".join(dict.fromkeys(method for method, _ in ways))
     made = _everywhere(like_the_first(source, made), working)
-    return made, {"unwrap": layout.method, "gutter": layout.packing.gutter}
+    return made, {"unwrap": method, "gutter": min(gutter for _, gutter in ways)}
 
 
-def _mended(uv: NDArray, working: Working, polygon: NDArray, path: Path) -> NDArray[np.float32]:
+def _mended(uv: NDArray, vertices: NDArray, triangles: NDArray, polygon: NDArray, path: Path) -> NDArray[np.float32]:
     """UVs (F, 3, 2) in which all faces have texels. Raises: InputError."""
-    made = mended(working.vertices, working.triangles, polygon, uv)
+    made = mended(vertices, triangles, polygon, uv)
     if made is None:
         remedy = "--uv keep lets them show a neighbour's texel, --uv new makes new ones"
         raise InputError(f"{path}: its UVs leave no room for the faces that have none; {remedy}")
     return made
 
 
-def _charts(source: Source, working: Working, uv: NDArray, problem: str | None) -> Kept:
+def _charts(source: Source, working: Working, sets: Divided, uv: NDArray, problem: str | None) -> Kept:
     """Charts of UVs (F, 3, 2), and what was found and done."""
-    area = face_normals(working.vertices, working.triangles)[1]
+    area, of_triangle = face_normals(working.vertices, working.triangles)[1], sets.of_face[polygons_of(source, working)]
     if problem is not None:
         said = [f"made new: {problem}", *told(source)]
         if len(said) > 1:
-            return Kept(sharing(working.triangles, uv, area), True, said)
-        return Kept(uv_charts(working.triangles, uv), False, said)
+            return Kept(sharing(working.triangles, uv, area, of_triangle), True, said)
+        return Kept(set_charts(working.triangles, uv, of_triangle), False, said)
     given = sound(loop_uvs(source)[working.loops])
     missing = ~np.asarray(np.isfinite(given).all((1, 2)))
     new = ~flat(uv) & (missing | (given != uv).any((1, 2)))
-    found = keep(working.triangles, uv, area, missing, new)
+    found = keep(working.triangles, uv, area, of_triangle, missing, new)
     return replace(found, told=[*found.told, *told(source)])
 
 
@@ -244,7 +271,6 @@ def _extras(source: Source, kept: bool) -> dict[str, NDArray]:
     none = np.full(len(source.loop_vertex), -1, np.int32)
     return {
         "face_group": none[: len(source.face_part)] if source.face_group is None else source.face_group,
-        "face_set": np.zeros(len(source.face_part), np.int32),
         "source_tangents": source.tangents,
         "loop_source_tangent": none if source.loop_tangent is None else source.loop_tangent,
         "source_images": np.frombuffer(b"".join(source.images if kept else []), np.uint8),

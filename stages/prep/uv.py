@@ -7,7 +7,7 @@ from stages.core.tiles import signed_area
 from stages.prep.source import Source
 from stages.prep.topology import face_components
 
-_RASTER = 2048  # texels across, for measuring overlap
+_RASTER, _LEAST = 2048, 256  # texels across, for measuring overlap
 
 
 def loop_uvs(source: Source) -> NDArray[np.float32]:
@@ -46,9 +46,14 @@ def overlap(uv: NDArray) -> float:
     return float((cover > 1).sum()) / once if once else 1.0
 
 
-def covered(uv: NDArray) -> NDArray[np.int32]:
-    """How many triangles (F, 3, 2) cover the centre of each texel of the unit square."""
-    return coverage(uv.astype(np.float64) * _RASTER, _RASTER, _RASTER)
+def covered(uv: NDArray, textures: int = 1) -> NDArray[np.int32]:
+    """How many triangles (F, 3, 2) cover the centre of each texel of the unit square.
+
+    Args:
+        textures: how many are asked about; the texels of all together stay about as many.
+    """
+    across = max(_RASTER >> ((textures - 1).bit_length() + 1) // 2, _LEAST)
+    return coverage(uv.astype(np.float64) * across, across, across)
 
 
 def coverage(points: NDArray, height: int, width: int) -> NDArray[np.int32]:

@@ -42,7 +42,7 @@ def test_representatives_against_a_search_through_all(seed: int) -> None:
     uv = (rng.uniform(-1, 1, (40, 1, 2)) + rng.uniform(-0.4, 0.4, (40, 3, 2))).astype(np.float32)
     charts = rng.integers(0, 9, 40).astype(np.int32)
     face, weights = strewn(uv)
-    found, theirs = Representatives(uv, charts).of(face, weights)
+    found, theirs = Representatives(uv, charts, np.zeros(len(uv), np.int32)).of(face, weights)
     place, copies = at(uv, face, weights), drawn(uv, charts)
     for point, own, first in zip(place - np.floor(place), face, found, strict=True):
         t = copies.corners
@@ -59,7 +59,7 @@ def test_representatives_against_a_search_through_all(seed: int) -> None:
 def test_a_mirrored_island_is_represented_by_the_other() -> None:
     uv = np.concatenate([square((0.1, 0.1)), square((0.1, 1.1))[:, ::-1]])
     face, weights = strewn(uv)
-    found, theirs = Representatives(uv, np.array([1, 1, 0, 0], np.int32)).of(face, weights)
+    found, theirs = Representatives(uv, np.array([1, 1, 0, 0], np.int32), np.zeros(len(uv), np.int32)).of(face, weights)
     assert (found >= 2).all()
     own = face >= 2
     assert (found[own] == face[own]).all()
@@ -71,7 +71,8 @@ def test_a_face_without_area_shows_the_texel_that_it_touches() -> None:
     inside, beside, apart = (np.full((1, 3, 2), place, np.float32) for place in ((0.3, 0.2), (0.5005, 0.3), (0.8, 0.8)))
     uv = np.concatenate([inside, beside, apart, square((0.1, 0.1))])
     assert flat(uv).tolist() == [True, True, True, False, False]
-    found, theirs = Representatives(uv, np.zeros(5, np.int32)).of(np.arange(3, dtype=np.int32), np.full((3, 3), 1 / 3))
+    none = np.zeros(5, np.int32)
+    found, theirs = Representatives(uv, none, none).of(np.arange(3, dtype=np.int32), np.full((3, 3), 1 / 3))
     assert found[2] == 2
     np.testing.assert_allclose(at(uv, found, theirs), [(0.3, 0.2), (0.5, 0.3), (0.8, 0.8)], atol=1e-6)
 
@@ -79,6 +80,6 @@ def test_a_face_without_area_shows_the_texel_that_it_touches() -> None:
 def test_the_scale_is_that_of_the_texture_on_the_surface() -> None:
     uv = np.concatenate([square((0.1, 0.1)), square((0.1, 0.1))])
     area = np.abs(signed_area(uv)) * np.array([4, 4, 1, 1])
-    found = Representatives(uv, np.array([0, 0, 1, 1], np.int32))
+    found = Representatives(uv, np.array([0, 0, 1, 1], np.int32), np.zeros(len(uv), np.int32))
     face = np.array([2, 3, 0], np.int32)
     assert found.scale(area, face, found.of(face, np.full((3, 3), 1 / 3))[0]).tolist() == [2, 2, 1]

@@ -15,7 +15,7 @@ def apart(uv: NDArray) -> NDArray[np.int64]:
 
 
 def told(uv: NDArray, area: NDArray | None = None) -> str | None:
-    return unusable(apart(uv), uv.astype(np.float32), np.ones(len(uv)) if area is None else area)
+    return unusable(apart(uv), uv.astype(np.float32), np.ones(len(uv)) if area is None else area, np.zeros(len(uv), int))
 
 
 def stacked(*layouts: NDArray) -> tuple[NDArray, NDArray]:
@@ -27,8 +27,8 @@ def stacked(*layouts: NDArray) -> tuple[NDArray, NDArray]:
 
 def kept(triangles: NDArray, uv: NDArray, missing: NDArray | None = None) -> tuple[NDArray, bool, str]:
     area = np.ones(len(uv))
-    assert unusable(triangles, uv, area) is None
-    found = keep(triangles, uv, area, np.zeros(len(uv), bool) if missing is None else missing)
+    assert unusable(triangles, uv, area, np.zeros(len(uv), int)) is None
+    found = keep(triangles, uv, area, np.zeros(len(uv), int), np.zeros(len(uv), bool) if missing is None else missing)
     return found.chart, found.shared, "; ".join(found.told)
 
 
@@ -86,9 +86,9 @@ def test_a_layout_that_repeats_too_often_is_not_kept() -> None:
     assert told(GRID * 4) is None
     assert told(GRID * 8) == "islands go through 10 tiles each: little of the texture would be a place's own"
     alike = stacked(*[GRID] * 24)
-    assert unusable(*alike, np.ones(len(alike[1]))) is None  # two dozen of one kind
+    assert unusable(*alike, np.ones(len(alike[1])), np.zeros(len(alike[1]), int)) is None  # two dozen of one kind
     area = np.repeat(np.geomspace(1, 400, 24), 128)
-    assert "of many sizes cover the same texels 24 times" in (unusable(*alike, area) or "")
+    assert "of many sizes cover the same texels 24 times" in (unusable(*alike, area, np.zeros(len(area), int)) or "")
 
 
 def test_polygons_without_uvs_take_one_texel_of_a_neighbour() -> None:
@@ -113,7 +113,7 @@ def test_a_face_at_the_end_of_the_world_is_one_without_uvs() -> None:
     uv[-1, 0], uv[-2, 0] = (3e38, -3e38), (1e5, 1e5)
     assert np.isnan(sound(uv)[-2:]).all()
     assert np.array_equal(sound(uv)[:-2], GRID)
-    assert unusable(triangles, uv, np.ones(130)) is None
+    assert unusable(triangles, uv, np.ones(130), np.zeros(130, int)) is None
     wide = GRID.copy()
     wide[:, 0] += np.float32(40)
     many = np.concatenate([np.tile(wide, (40, 1, 1)), GRID])
