@@ -16,6 +16,9 @@ THREE   := $(VENV)/.three
 MESH   ?=
 PROMPT ?=
 OUT    ?=
+# a scene and what its objects are made of: make -j2 scene SCENE=room.glb PROMPTS=prompts.toml
+SCENE   ?=
+PROMPTS ?=
 # a folder of jobs, each a folder with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
 JOBS   ?= jobs
 # what `make export` writes every asset of JOBS for
@@ -33,12 +36,12 @@ DISTILL_OPTIONS    ?=
 BAKE_OPTIONS       ?=
 
 # recipes read all of these from the environment, so that names may hold blanks, quotes and signs
-export MESH PROMPT OUT JOBS FOR ASSETS PREP_OPTIONS CONDITIONS_OPTIONS DISTILL_OPTIONS BAKE_OPTIONS
+export MESH PROMPT OUT SCENE PROMPTS JOBS FOR ASSETS PREP_OPTIONS CONDITIONS_OPTIONS DISTILL_OPTIONS BAKE_OPTIONS
 OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" \
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test campaign hostile uvs parts lint asset batch export docs bench beside clean
+.PHONY: help setup demo test campaign hostile uvs parts lint asset batch scene export docs bench beside clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -96,8 +99,16 @@ MESHES  = obj|glb|gltf|fbx|usdz|usdc|usda|usd|ply|stl|off
 job-%:
 	@prompt=$$($(FOLDERS) | sed -n '$*p'); folder=$$(dirname "$$prompt"); \
 	mesh=$$(find "$$folder" -maxdepth 1 -type f | grep -iE '\.($(MESHES))$$' | sort | head -n 1); \
+	[ -n "$$mesh" ] || [ ! -f "$$folder/prep.npz" ] || mesh="$$folder/prep.npz"; \
 	[ -n "$$mesh" ] || { echo "$$folder: no mesh there ($(MESHES))" >&2; exit 1; }; \
 	$(DREAMMAT) run "$$mesh" --prompt "$$(cat "$$prompt")" -o "$$folder" $(OPTIONS)
+
+scene: $(VENV)/.ready  ## every object of a scene, in place, and the scene again: make -j2 scene SCENE=room.glb PROMPTS=prompts.toml
+	@[ -n "$$SCENE" ] && [ -n "$$PROMPTS" ] || { echo 'usage: make scene SCENE=room.glb PROMPTS=prompts.toml [OUT=folder]' >&2; exit 2; }
+	@name=$$(basename "$$SCENE"); folder="$${OUT:-scenes/$${name%.*}}"; \
+	$(DREAMMAT) prep "$$SCENE" --split "$$folder" --prompts "$$PROMPTS" $$PREP_OPTIONS && \
+	$(MAKE) --no-print-directory batch JOBS="$$folder" PREP_OPTIONS= && \
+	$(DREAMMAT) assemble "$$folder"/*/asset -o "$$folder/scene.glb"
 
 export: $(VENV)/.ready  ## every asset of JOBS for another program: make export JOBS=jobs FOR=unreal
 	@for manifest in "$$JOBS"/*/asset/bake.json; do \

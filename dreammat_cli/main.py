@@ -19,6 +19,7 @@ COMMANDS = {
     "distill": "Optimise the material for a prompt.",
     "bake": "Write textures and a model with the material.",
     "edit": "Change colours, roughness and metallic of an asset, whole or by part.",
+    "assemble": "Put assets of a scene's objects together again.",
     "export": "Write an asset for Blender, Unreal, Unity, the web, USD or MaterialX.",
     "material": "Write tiling maps of a material from a prompt alone.",
     "report": "Measure speed against error.",

@@ -1,5 +1,6 @@
 """dreammat prep"""
 
+import dataclasses
 from pathlib import Path
 
 import click
@@ -12,7 +13,11 @@ DEFAULT = defaults(PrepOptions)
 
 @click.command()
 @click.argument("mesh", type=INPUT, metavar="MESH")
-@click.option("-o", "--output", type=INPUT, required=True, metavar="PREP.npz", help="The file to write.")
+@click.option("-o", "--output", type=INPUT, metavar="PREP.npz", help="The file to write.")
+@click.option("--split", "folder", type=INPUT, metavar="FOLDER",
+              help="Instead: a job for each object of a scene, in place, FOLDER/NAME/prep.npz; the others cast shadows.")
+@click.option("--prompts", type=INPUT, metavar="PROMPTS.toml",
+              help="With --split: prompts by name or pattern; checked first, then written as FOLDER/NAME/prompt.txt.")
 @click.option("--up", type=click.Choice(["y", "z"]), default=DEFAULT["up"], show_default=True,
               help="The source's up axis: y with front +z, or z with front -y (Blender).")
 @click.option("--texture-size", type=click.IntRange(64, 16384), default=DEFAULT["texture_size"], show_default=True,
@@ -36,12 +41,19 @@ DEFAULT = defaults(PrepOptions)
 @click.option("--unwrap-triangles", type=click.IntRange(0), default=DEFAULT["unwrap_triangles"], show_default=True,
               metavar="N", help="A larger mesh does not try xatlas.")
 @common_options
-def command(mesh: Path, output: Path, common: Common, **chosen: object) -> None:
+def command(
+    mesh: Path, output: Path | None, folder: Path | None, prompts: Path | None, common: Common, **chosen: object
+) -> None:
     """Read, check, mend, orient and unwrap MESH (.obj .ply .stl .off .glb .gltf .fbx .usd).
 
     The source's vertices, faces, UVs and frame are kept beside the working mesh, for `bake` to give back.
     """
     options = PrepOptions(**chosen)  # type: ignore[arg-type]
+    if output is None:
+        split_scene(mesh, folder, prompts, options, common)
+        return
+    if folder is not None or prompts is not None:
+        raise click.UsageError("give -o PREP.npz for one mesh, or --split FOLDER (with --prompts, if you like) for a scene")
     if plan(common, "prepare", output, options):
         return
     from stages.prep.stage import prep
@@ -51,3 +63,22 @@ def command(mesh: Path, output: Path, common: Common, **chosen: object) -> None:
     data = {"output": str(output), "up_to_date": result.up_to_date, "findings": result.findings}
     state = ": up to date" if result.up_to_date else ""
     show(common, data, [f"{output}{state}", *([] if result.up_to_date else lines_of(result.findings))])
+
+
+def split_scene(mesh: Path, folder: Path | None, prompts: Path | None, options: PrepOptions, common: Common) -> None:
+    """A job for each object of a scene."""
+    if folder is None:
+        raise click.UsageError("give -o PREP.npz for one mesh, or --split FOLDER for a scene")
+    if plan(common, "split into", folder, options):
+        return
+    from stages.prep.split import split
+
+    with reporter(common) as progress:
+        made = split(mesh, folder, options, prompts, common.force, progress)
+    for name, why in made.unusable.items():
+        click.echo(f"{name}: left out: {why}", err=True)
+    state = ": up to date" if made.up_to_date else ""
+    lines = [f"{folder}{state}: {len(made.objects)} objects", *(f"  {name}" for name in made.objects)]
+    if made.unprompted:
+        lines.append(f"without a prompt, they only cast shadows: {', '.join(made.unprompted)}")
+    show(common, {"output": str(folder), **dataclasses.asdict(made)}, lines)

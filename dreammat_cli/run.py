@@ -25,9 +25,13 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
     """Texture MESH: prep, conditions, distill and bake in one call.
 
     The same files as the four commands write, with the same bytes; what is up to date is not done again, and a run that
-    was stopped continues. With --json every stage prints a line of its own.
+    was stopped continues. MESH may be a prep.npz, such as an object's of `prep --split`. With --json every stage prints a
+    line of its own.
     """
     prep, conditions, material = output / "prep.npz", output / "conditions", output / "material.npz"
+    stages: tuple[str, ...] = STAGES
+    if mesh.suffix.lower() == ".npz":
+        prep, stages = mesh, STAGES[1:]
     arguments = {
         "prep": [mesh, "-o", prep],
         "conditions": [prep, "-o", conditions],
@@ -35,13 +39,13 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
         "bake": [prep, material, "-o", output / "asset"],
     }
     contexts = []
-    for stage in STAGES:  # all options are read before anything long begins
+    for stage in stages:  # all options are read before anything long begins
         options = [word for name, text in further if name == stage for word in split(text)]
         words = [*map(str, arguments[stage]), *options, *common.flags()]
         contexts.append(import_module(f"dreammat_cli.{stage}").command.make_context(f"dreammat {stage}", words))
     for number, context in enumerate(contexts, 1):
         if not (common.quiet or common.as_json):
-            click.echo(f"[{number} of {len(STAGES)}] {STAGES[number - 1]}", err=True)
+            click.echo(f"[{number} of {len(stages)}] {stages[number - 1]}", err=True)
         with context:
             context.command.invoke(context)
         if STAGES[number - 1] == "prep" and not common.dry_run:

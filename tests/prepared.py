@@ -35,6 +35,8 @@ def save_prep(path: Path, vertices: NDArray, triangles: NDArray, normals: NDArra
         "source_images": np.zeros(0, np.uint8),
         "face_part": np.zeros(count, np.int32),
         "face_group": np.full(count, -1, np.int32),
+        "caster_vertices": np.zeros((0, 3), "f4"),
+        "caster_triangles": np.zeros((0, 3), "i4"),
         "face_set": np.zeros(count, np.int32),
         "loop_uv": np.zeros((3 * count, 2), np.float32),
     }

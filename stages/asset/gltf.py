@@ -99,6 +99,23 @@ class Look:
         ]
 
 
+def bare(model: Model) -> tuple[dict[str, Any], bytes]:
+    """JSON and binary part of a model in plain grey."""
+    buffer = _Buffer()
+    worn = list(dict.fromkeys(part.worn for part in model.parts))
+    meshes, nodes, roots = _scene(model, worn, buffer)
+    grey = {"baseColorFactor": [0.5, 0.5, 0.5, 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.8}
+    root: dict[str, Any] = {
+        "meshes": meshes,
+        "nodes": nodes,
+        "scenes": [{"nodes": roots}],
+        "materials": [{"name": of.name or "material", "pbrMetallicRoughness": grey, "doubleSided": True} for of in worn],
+        "accessors": buffer.accessors,
+        "bufferViews": buffer.views,
+    }
+    return root, b"".join(buffer.pieces)
+
+
 def write_glb(path: Path, model: Model, look: Look) -> None:
     """Write model.glb atomically."""
     buffer = _Buffer()

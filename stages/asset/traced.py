@@ -21,7 +21,8 @@ from stages.light.scene import Scene
 
 def traced_scene(prep: Artifact) -> Scene:
     """The scene of a prepared mesh; normals lean by the source's normal maps, and it emits, where its UVs were kept."""
-    return Scene(prep["vertices"], prep["triangles"], prep["normals"], source_bumps(prep), source_emission(prep))
+    around = prep["caster_vertices"], prep["caster_triangles"]
+    return Scene(prep["vertices"], prep["triangles"], prep["normals"], source_bumps(prep), source_emission(prep), around)
 
 
 def source_bumps(prep: Artifact) -> NormalMaps | None:

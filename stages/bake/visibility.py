@@ -138,4 +138,4 @@ def is_open(triangles: NDArray[np.int32]) -> bool:
 
 def _occluded(scene: Scene, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
     parts = [slice(i, i + RAYS_PER_TASK) for i in range(0, len(origins), RAYS_PER_TASK)]
-    return np.concatenate([np.zeros(0, bool), *in_parallel(lambda p: scene.occluded(origins[p], directions[p]), parts)])
+    return np.concatenate([np.zeros(0, bool), *in_parallel(lambda p: scene.hidden(origins[p], directions[p]), parts)])

@@ -97,7 +97,7 @@ def conditions(
             save_environment(out / "environments" / f"{light.name}.exr", light)
         scene = traced_scene(mesh)
         label = labels(mesh)
-        survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.occluded, label)
+        survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.hidden, label)
         save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None
         subject = Subject(scene, smooth, label, shared_texels(mesh))

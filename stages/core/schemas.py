@@ -32,15 +32,25 @@ PREP = Schema(
         "face_group": Field("i4", ("P",)),  # entry of extra["groups"], or -1
         "face_set": Field("i4", ("P",)),  # entry of extra["sets"], the texture set that the face shows
         "loop_uv": Field("f4", ("L", 2)),  # the UVs that textures are baked for, v up
+        # other objects of the scene, world frame, which only cast shadows
+        "caster_vertices": Field("f4", ("CV", 3)),
+        "caster_triangles": Field("i4", ("CF", 3), rows_of="CV"),
     },
     # source_format: "obj" | "ply" | "stl" | "off" | "glb" | "fbx" | "usd"; uv_kept: bool; findings: what was found and mended;
     # parts: one per material slot and node: {"name", "material", "node", "transform" (16 numbers, row by row), "instance_of"
     # (the first part of the same mesh and slot, whose texels it shows, or -1)}
     # shared_texels: whether a texel may show more than one place, see `core.tiles`
     # sets: texture sets, at least one, as `core.texture_sets` has them
+    # scene (only of an object of a scene): its nodes, see `prep.objects`, "source" (a hash) and "object" (a row of "objects")
     # groups: names of an OBJ's groups; passed_on: what materials of a glTF had besides, see `stages.asset.passed_on`
     extra=("source_format", "source_name", "uv_kept", "shared_texels", "parts", "sets", "groups", "passed_on", "findings"),
 )
+
+SCENE = Schema("dreammat.scene", 1, extra=("objects", "unusable"), manifest="scene.json")
+"""A folder that `prep --split` wrote: scene.json and, for each object, <object>/prep.npz, whose extra["scene"] has the scene's
+nodes. Further files are of later commands: <object>/prompt.txt, conditions/, material.npz, asset/.
+
+objects: {"name", "title"} in the order of their first nodes; unusable: name -> why there is no prep.npz."""
 
 CAMERAS = Schema(
     "dreammat.cameras",

@@ -66,6 +66,7 @@ class Scene:
     Args:
         vertices: (V, 3) float32 world. triangles: (F, 3) int32. normals: (F, 3, 3) float32 unit, per corner.
         bumps: normal maps that shading normals follow, if any. emission: what shines by itself, if anything; pictures show it.
+        casters: vertices (CV, 3) and triangles (CF, 3) of what stands around and keeps light away, but is not seen.
     """
 
     def __init__(
@@ -75,12 +76,19 @@ class Scene:
         normals: NDArray,
         bumps: NormalMaps | None = None,
         emission: Emission | None = None,
+        casters: tuple[NDArray, NDArray] | None = None,
     ) -> None:
         self.bumps, self.emission = bumps, emission
+        self._casters = casters if casters is not None and len(casters[1]) else None
         self.vertices = np.ascontiguousarray(vertices, np.float32)
         self.triangles = np.ascontiguousarray(triangles, np.int32)
         self.normals = np.ascontiguousarray(normals, np.float32)
-        self._closest, self._any = (_Tree(self.vertices, self.triangles, robust) for robust in (True, False))
+        self._closest, self._own = (_Tree(self.vertices, self.triangles, robust) for robust in (True, False))
+        self._any = self._own
+        if self._casters is not None:
+            vertices = np.concatenate([self.vertices, self._casters[0]]).astype(np.float32)
+            triangles = np.concatenate([self.triangles, self._casters[1] + len(self.vertices)]).astype(np.int32)
+            self._any = _Tree(vertices, triangles, robust=False)
 
     def intersect(self, origins: NDArray, directions: NDArray) -> Hits:
         """Closest hit of each ray. Args: (R, 3) each; directions need not be unit: t is in their length."""
@@ -91,8 +99,12 @@ class Scene:
         return Hits(mask, np.where(mask, hit["tfar"], 0).astype(np.float32), hit["primID"], barycentric)
 
     def occluded(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
-        """Whether anything lies along each ray, at any distance. Args: (R, 3) each."""
+        """Whether anything, casters too, lies along each ray, at any distance. Args: (R, 3) each."""
         return self._any.run(origins, directions, query="OCCLUDED") >= 0
+
+    def hidden(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
+        """Whether the mesh itself lies along each ray, at any distance. Args: (R, 3) each."""
+        return self._own.run(origins, directions, query="OCCLUDED") >= 0
 
     def shaded_smooth(self) -> "Scene":
         """The same mesh with normals that are smooth over every edge: at a vertex, its faces' by the angle they have there.
@@ -107,7 +119,8 @@ class Scene:
         total = np.stack([np.bincount(vertex, weighted[:, k], len(self.vertices)) for k in range(3)], -1)
         length = np.linalg.norm(total, axis=-1, keepdims=True)
         smooth = (total / np.where(length > 1e-6, length, 1))[self.triangles]
-        return Scene(self.vertices, self.triangles, np.where((length > 1e-6)[self.triangles], smooth, face))
+        normals = np.where((length > 1e-6)[self.triangles], smooth, face)
+        return Scene(self.vertices, self.triangles, normals, casters=self._casters)
 
     def geometric_normal(self, triangle: NDArray) -> NDArray[np.float32]:
         """Unit normal of each triangle, by its winding. Args: (P,). Returns: (P, 3); zero for a degenerate one."""

@@ -48,17 +48,25 @@ class Nodes:
 
     def of_scene(self) -> list[int]:
         """Nodes of the default scene; of all trees where there is none."""
+        return self.below(self.roots())
+
+    def roots(self) -> list[int]:
+        """Those of the default scene; of all trees where there is none."""
         if not self.gltf.root.get("scenes"):
-            return self.below(self.orphans)
-        return self.below(list(self.gltf.item("scenes", self.gltf.root.get("scene", 0)).get("nodes", [])))
+            return self.orphans
+        return list(self.gltf.item("scenes", self.gltf.root.get("scene", 0)).get("nodes", []))
+
+    def instancing(self, index: int) -> dict[str, NDArray[np.float64]]:
+        """Translations, rotations and scales of a node's instances, of what there is; empty where it has none."""
+        attributes = self.entries[index].get("extensions", {}).get(_INSTANCING, {}).get("attributes") or {}
+        return {name: accessor(self.gltf, attributes[name]).astype(np.float64)
+                for name in ("TRANSLATION", "ROTATION", "SCALE") if name in attributes}  # fmt: skip
 
     def instances(self, index: int) -> tuple[list[NDArray], bool]:
         """Transforms to the scene of what hangs on a node, and whether they come from instancing."""
-        attributes = self.entries[index].get("extensions", {}).get(_INSTANCING, {}).get("attributes")
-        if not attributes:
+        columns = self.instancing(index)
+        if not columns and not self.entries[index].get("extensions", {}).get(_INSTANCING, {}).get("attributes"):
             return [self.world[index]], False
-        columns = {name: accessor(self.gltf, attributes[name]).astype(np.float64)
-                   for name in ("TRANSLATION", "ROTATION", "SCALE") if name in attributes}  # fmt: skip
         count = min((len(rows) for rows in columns.values()), default=0)
         keys = {"TRANSLATION": "translation", "ROTATION": "rotation", "SCALE": "scale"}
         rows = [{keys[name]: values[i] for name, values in columns.items()} for i in range(count)]

@@ -19,7 +19,7 @@ from stages.prep.gltf_data import accessor, unpacked
 from stages.prep.gltf_file import DRACO, Gltf, open_gltf
 from stages.prep.gltf_nodes import Nodes, morphed, skinned
 from stages.prep.gltf_textures import material_name, pass_on
-from stages.prep.source import IDENTITY, Part, Source, check_range, polygons
+from stages.prep.source import IDENTITY, Part, Source, Tree, check_range, polygons
 
 _POINTS, _TRIANGLES, _STRIP, _FAN = 0, 4, 5, 6
 
@@ -70,6 +70,7 @@ class _Geometry:
     tangents: _Rows = field(default_factory=lambda: _Rows([np.zeros((0, 4), np.float32)]))
     corners: list[tuple[NDArray, _Block]] = field(default_factory=list)  # vertices within the block
     parts: list[Part] = field(default_factory=list)
+    places: list[tuple[int, int]] = field(default_factory=list)  # node and instance of each part
     skipped: dict[str, int] = field(default_factory=dict)
     applied: dict[str, int] = field(default_factory=dict)
     blocks: dict[tuple, _Block] = field(default_factory=dict)
@@ -80,6 +81,7 @@ def read_gltf(path: Path) -> Source:
     gltf = open_gltf(path)
     try:
         geometry = _gather(gltf)
+        tree = _tree(gltf, geometry)
         passed_on, images = pass_on(gltf, lambda what: _count(geometry.skipped, what))
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise InputError(f"{path}: not valid glTF 2.0 ({type(error).__name__}: {error}); export it again") from None
@@ -94,7 +96,7 @@ def read_gltf(path: Path) -> Source:
         first, _loops(geometry, lambda block: block.normal), face_part.astype(np.int32), geometry.parts, v_down=True,
         skipped=geometry.skipped, applied=geometry.applied, more_uv=[(uv, rows) for rows in more],
         tangents=geometry.tangents.joined(), loop_tangent=_loops(geometry, lambda block: block.tangent),
-        passed_on=passed_on, images=images,
+        passed_on=passed_on, images=images, tree=tree,
     )  # fmt: skip
 
 
@@ -117,6 +119,21 @@ def _gather(gltf: Gltf) -> _Geometry:
         if gltf.root.get(kind):
             _count(geometry.skipped, kind, len(gltf.root[kind]))
     return geometry
+
+
+def _tree(gltf: Gltf, geometry: _Geometry) -> Tree:
+    """The scene's nodes, for who gives them back."""
+    nodes, kept = Nodes(gltf), ("name", "children", "translation", "rotation", "scale", "matrix", "extras")
+    entries, meshes, posed = list[dict[str, Any]](), list[int](), list[int]()
+    with_parts = {node for node, _ in geometry.places}
+    for index, node in enumerate(nodes.entries):
+        entries.append({key: node[key] for key in kept if key in node})
+        if columns := nodes.instancing(index):
+            entries[-1]["instances"] = {name: rows.tolist() for name, rows in columns.items()}
+        alone = "skin" in node or "weights" in node  # another pose of the mesh
+        meshes.append(-1 if index not in with_parts else len(gltf.root["meshes"]) + index if alone else node["mesh"])
+        posed += [index] * ("skin" in node and index in with_parts)
+    return Tree(entries, nodes.roots(), geometry.places, meshes, posed)
 
 
 def _count(counts: dict[str, int], what: str, count: int = 1) -> None:
@@ -166,6 +183,7 @@ def _add_mesh(
         check_range(corner, block.count, "vertex", gltf.path)
         gltf.bounded(geometry.positions.count, "vertices")
         geometry.corners.append((corner, block))
+        geometry.places.append(key)
         geometry.parts.append(Part(name, material, at.node, at.transform if posed is None else IDENTITY))
 
 

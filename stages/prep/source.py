@@ -38,6 +38,22 @@ class Part:
 
 
 @dataclass(frozen=True)
+class Tree:
+    """The nodes of a scene as its file has them.
+
+    nodes: glTF's entries: "name", "children", places, "extras"; "instances" has the columns of EXT_mesh_gpu_instancing as
+    numbers. roots: rows of them. places: of each part, its node and the number of the instance on it. meshes: of each node,
+    what is equal where nodes share a mesh, -1 where nothing hangs on it. posed: nodes whose vertices are in the scene's frame.
+    """
+
+    nodes: list[dict[str, Any]]
+    roots: list[int]
+    places: list[tuple[int, int]]
+    meshes: list[int]
+    posed: list[int] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
 class Source:
     """A mesh file's content.
 
@@ -49,7 +65,7 @@ class Source:
     passed_on, images: what materials have besides colour, see `stages.asset.passed_on`.
     skipped: what the file holds besides triangles and polygons, with its count.
     applied: what made these vertices out of the file's (skins, morph targets, instances). more_uv: further UV sets, uv and
-    loop_uv of each.
+    loop_uv of each. tree: the scene's nodes, where the format has some.
     """
 
     format: str
@@ -72,6 +88,7 @@ class Source:
     loop_tangent: NDArray[np.int32] | None = None
     passed_on: dict[str, Any] = field(default_factory=nothing_passed_on)
     images: list[bytes] = field(default_factory=list)
+    tree: Tree | None = None
 
     def by_uv_set(self) -> list["Source"]:
         """This source, and itself with each further UV set in the first one's place; tangents and the textures passed on

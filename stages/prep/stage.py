@@ -59,50 +59,57 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
 
     Raises: InputError, OutputError.
     """
-    request = Provenance(plain_options(options), None, _inputs(mesh))
+    request = Provenance(plain_options(options), None, inputs_of(mesh))
     made = None if force else peek(out, PREP)
     if made is not None and made.same_request(request):
         return PrepResult(True, made.extra["findings"])
     with run_log(out):
         progress("read", 0, 4)
-        source = READERS[mesh.suffix.lower()](mesh)
-        source = source if options.own_instances else with_instances(source)
-        progress("mend", 1, 4)
-        working = repair(source, options.up, options.weld_tolerance, mesh)
-        normals, findings = oriented(source, working, options.crease_angle)
-        progress("unwrap", 2, 4)
-        source, sets, layout = _with_bakeable_uv(source, working, options, mesh)
-        loop_uv, way = _texture(source, working, sets, options, layout["unusable_uv"], mesh)
-        kept, uv = layout["unusable_uv"] is None, loop_uv[working.loops]
-        found = _charts(source, working, sets, uv, layout["unusable_uv"])
-        chart, way["uv"], way["texture_sets"] = found.chart, "; ".join(found.told), sets.told
-        measured = topology(working.vertices, working.triangles)
-        findings = _findings(source, working, findings, layout | way) | measured | {
-            "charts": int(chart.max()) + 1,
-            "texel_density": _texel_density(working, uv, options.texture_size),
-            "texture_filled": round(float(np.abs(signed_area(uv)).sum()) / len(sets.sets), 3),
-            "stretch": round(stretch(working.vertices[working.triangles], uv), 3),
-        }
-        progress("write", 3, 4)
-        extra = {
-            "source_format": source.format,
-            "source_name": mesh.name,
-            "uv_kept": kept,
-            "shared_texels": found.shared,
-            "parts": [asdict(part) for part in source.parts],
-            "sets": [one.to_json() for one in sets.sets],
-            "groups": source.groups,
-            "passed_on": source.passed_on if kept else nothing_passed_on(),
-            "findings": findings,
-        }
-        arrays = _arrays(source, working, normals, uv, chart, loop_uv) | _extras(source, kept)
-        arrays["face_set"] = sets.of_face
+        arrays, extra = prepared(READERS[mesh.suffix.lower()](mesh), mesh, options, progress)
         save_npz(out, PREP, arrays, Provenance(request.options, None, request.inputs, extra))
         progress("write", 4, 4)
-    return PrepResult(False, findings)
+    return PrepResult(False, extra["findings"])
 
 
-def _inputs(mesh: Path) -> dict[str, str]:
+def prepared(
+    source: Source, mesh: Path, options: PrepOptions, progress: Progress = silent
+) -> tuple[dict[str, NDArray], dict[str, Any]]:
+    """Arrays of prep.npz, and what its header says. Args: mesh: the file, for its name. Raises: InputError."""
+    source = source if options.own_instances else with_instances(source)
+    progress("mend", 1, 4)
+    working = repair(source, options.up, options.weld_tolerance, mesh)
+    normals, findings = oriented(source, working, options.crease_angle)
+    progress("unwrap", 2, 4)
+    source, sets, layout = _with_bakeable_uv(source, working, options, mesh)
+    loop_uv, way = _texture(source, working, sets, options, layout["unusable_uv"], mesh)
+    kept, uv = layout["unusable_uv"] is None, loop_uv[working.loops]
+    found = _charts(source, working, sets, uv, layout["unusable_uv"])
+    chart, way["uv"], way["texture_sets"] = found.chart, "; ".join(found.told), sets.told
+    measured = topology(working.vertices, working.triangles)
+    findings = _findings(source, working, findings, layout | way) | measured | {
+        "charts": int(chart.max()) + 1,
+        "texel_density": _texel_density(working, uv, options.texture_size),
+        "texture_filled": round(float(np.abs(signed_area(uv)).sum()) / len(sets.sets), 3),
+        "stretch": round(stretch(working.vertices[working.triangles], uv), 3),
+    }
+    progress("write", 3, 4)
+    extra = {
+        "source_format": source.format,
+        "source_name": mesh.name,
+        "uv_kept": kept,
+        "shared_texels": found.shared,
+        "parts": [asdict(part) for part in source.parts],
+        "sets": [one.to_json() for one in sets.sets],
+        "groups": source.groups,
+        "passed_on": source.passed_on if kept else nothing_passed_on(),
+        "findings": findings,
+    }
+    arrays = _arrays(source, working, normals, uv, chart, loop_uv) | _extras(source, kept)
+    arrays["face_set"] = sets.of_face
+    return arrays, extra
+
+
+def inputs_of(mesh: Path) -> dict[str, str]:
     """SHA-256 of the mesh and of the files that it is spread over."""
     suffix = mesh.suffix.lower()
     if suffix not in READERS:
@@ -271,6 +278,8 @@ def _extras(source: Source, kept: bool) -> dict[str, NDArray]:
     none = np.full(len(source.loop_vertex), -1, np.int32)
     return {
         "face_group": none[: len(source.face_part)] if source.face_group is None else source.face_group,
+        "caster_vertices": np.zeros((0, 3), np.float32),
+        "caster_triangles": np.zeros((0, 3), np.int32),
         "source_tangents": source.tangents,
         "loop_source_tangent": none if source.loop_tangent is None else source.loop_tangent,
         "source_images": np.frombuffer(b"".join(source.images if kept else []), np.uint8),

@@ -108,6 +108,8 @@ def prep_arrays(example: Example) -> dict[str, NDArray]:
         "loop_source_normal": loops if has_normal else np.full(len(loops), -1, "i4"),
         "face_part": np.array(example.part, "i4"),
         "face_group": np.array(example.group or [-1] * len(example.faces), "i4"),
+        "caster_vertices": np.zeros((0, 3), "f4"),
+        "caster_triangles": np.zeros((0, 3), "i4"),
         "face_set": np.array(example.set or [0] * len(example.faces), "i4"),
         "loop_uv": uv,
         "source_tangents": np.zeros((0, 4), "f4"),
