@@ -21,8 +21,9 @@ SIDES = ("below", "above", "front", "back", "left", "right", "fade")
 DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "spots", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
 
-LEAST = {"edges": 0.08, "crevices": 0.08, "hidden": 0.06}
-"""Least of their fields that counts as an edge, a crease, hidden from the sky: a sphere has none of them."""
+LEAST = {"edges": 0.08, "crevices": 0.08, "hidden": 0.06, "up": 0.25, "down": 0.25}
+"""Least of their fields that counts as an edge, a crease, hidden from the sky, facing up or down: a sphere has none of the
+first three, and a box's walls keep no snow."""
 
 CHANCE = ("patches", "streaks", "scratches", "chips")
 """Kinds whose field is noise of deviation 1."""
@@ -33,9 +34,14 @@ def coverage(masks: tuple[Mask, ...], surface: Surface, world: Place) -> Array:
     result = np.ones(len(surface), np.float32)
     for number, mask in enumerate(masks):
         if mask.kind != "all":
-            own = _cover(mask, surface, world.seeded(101 + number))
+            own = _cover(mask, surface, _drawn(mask, world.seeded(101 + number)))
             result *= 1 - own if mask.invert else own
     return result
+
+
+def _drawn(mask: Mask, at: Place) -> Place:
+    """Where a mask's chance is drawn."""
+    return at if mask.draw < 0 else replace(at, seed=mask.draw * 7919 + 101)
 
 
 def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
@@ -52,17 +58,17 @@ def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
         soft = np.maximum(0.5 * at.footprint, 1.2 * ragged * lost(at, rough)) if mask.wear else 0.5 * at.footprint
         return edge(value - level, 2 * soft)
     if mask.kind in CHANCE:
-        return exceeds(value, level, 0.06, lost(at, _chance(mask)))
+        return exceeds(value, level, 0.06 + mask.soft, lost(at, _chance(mask)))
     rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.9, patch=0.4)
     amount: Array = np.full(len(at), 0.2 * mask.wear, np.float32)
     if mask.kind in LEAST:  # where there is neither edge nor crease, noise makes none
         amount = amount * np.clip(value / np.float32(max(level, LEAST[mask.kind])), 0.25, 1)
     worn = value + amount * fbm(at, rough, 5) if mask.wear else value
-    return exceeds(worn, level, 0.004 + 0.016 * mask.wear, amount * lost(at, rough))
+    return exceeds(worn, level, 0.004 + 0.016 * mask.wear + mask.soft, amount * lost(at, rough))
 
 
 def _chance(mask: Mask) -> Spectrum:
-    stretch = {"streaks": (0.12, 0.12, 1.0), "scratches": (1.0, 0.02, 0.02)}.get(mask.kind, (1.0, 1.0, 1.0))
+    stretch = {"streaks": (0.16, 0.16, 2.5), "scratches": (1.0, 0.02, 0.02)}.get(mask.kind, (1.0, 1.0, 1.0))
     rise = 0.55 + 0.35 * mask.wear
     return Spectrum(mask.size, max(mask.size / 128, 2e-4), rise, stretch, patch=0.4 * mask.wear)
 
@@ -139,7 +145,9 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
             return mask
         if mask.kind in SIDES and mask.said and (part := found(mask, surface)):
             return part
-        value = signal(mask, surface, place)
+        if mask.draw >= 0:
+            mask = replace(mask, draw=31 * recipe.seed + mask.draw)
+        value = signal(mask, surface, _drawn(mask, place))
         if mask.kind in SIDES:  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())
             return replace(mask, level=high - mask.share * (high - low))

@@ -41,7 +41,9 @@ class Mask:
     """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the extent for heights and sides. size: of its
     shapes or of its border's noise, as a share of the object. wear: 0 a border as sharp as paint … 1 a ragged one. invert:
     everywhere else. level: threshold of what the mask is made of, once settled; None before. said: the word that asked for
-    it, for people. pieces: rows of the survey's, of kind "pieces"; axis: a direction, of kind "along". """
+    it, for people. pieces: rows of the survey's, of kind "pieces"; axis: a direction, of kind "along". soft: how far it thins
+    out at its border, in units of what it follows; chance has deviation 1. draw: masks of one draw share their chance, as a
+    paint's chips and its primer's do; −1: its own. """
 
     kind: str = "all"
     share: float = 0.3
@@ -52,6 +54,8 @@ class Mask:
     said: str = ""
     pieces: tuple[int, ...] = ()
     axis: tuple[float, ...] = ()
+    soft: float = 0.0
+    draw: int = -1
 
 
 @dataclass(frozen=True)

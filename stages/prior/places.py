@@ -6,15 +6,16 @@ from stages.material.recipe import Mask
 
 
 class Region(NamedTuple):
-    """kind, share, size, wear: of a mask. Parts end where they end; weather does not."""
+    """kind, share, size, wear, soft: of a mask. Parts end where they end; weather does not, and powders and stains thin out."""
 
     kind: str
     share: float
     size: float = 0.05
     wear: float = 0.0
+    soft: float = 0.0
 
     def mask(self, said: str = "") -> Mask:
-        return Mask(self.kind, self.share, self.size, self.wear, said=said)
+        return Mask(self.kind, self.share, self.size, self.wear, said=said, soft=self.soft)
 
 
 def _table(*entries: tuple[str, Region]) -> dict[str, Region]:
@@ -87,7 +88,7 @@ SHAPES = _table(
      "spattered, splashed, patched, blotchy, smudges, smears, puddles, flames, graffiti, spills",
      Region("patches", 0.35, 0.16, 0.7)),
     ("rain streaks, water streaks, water marks, streaks, drips, runs, streaked, drippings, dripping",
-     Region("streaks", 0.2, 0.12, 0.8)),
+     Region("streaks", 0.2, 0.12, 0.8, 0.25)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
     ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks, lines, kintsugi, "
      "lightning", Region("veins", 0.06, 0.22)),
@@ -114,17 +115,19 @@ ANIMALS = {
 GATHERS = {
     "moss": Region("crevices", 0.4, 0.18, 1.0), "rust": Region("chips", 0.4, 0.12, 1.0),
     "dirt": Region("crevices", 0.35, 0.15, 1.0),
-    "mud": Region("below", 0.25, 0.15, 1.0), "soil": Region("crevices", 0.35, 0.15, 1.0), "snow": Region("up", 0.42, 0.12, 0.4),
+    "mud": Region("below", 0.25, 0.15, 1.0), "soil": Region("crevices", 0.35, 0.15, 1.0),
+    "snow": Region("up", 0.42, 0.12, 0.4, 0.02),
     "verdigris": Region("crevices", 0.35, 0.14, 1.0), "frost": Region("edges", 0.35, 0.1, 1.0),
     "ice": Region("up", 0.3, 0.15, 0.6),
     "lichen": Region("patches", 0.25, 0.1, 1.0), "gold leaf": Region("patches", 0.5, 0.25, 0.8),
-    "ash": Region("up", 0.45, 0.2, 1.0),
-    "soot": Region("patches", 0.4, 0.3, 1.0), "dust": Region("up", 0.5, 0.2, 1.0), "sand": Region("up", 0.4, 0.2, 1.0),
+    "ash": Region("up", 0.45, 0.2, 1.0, 0.12),
+    "soot": Region("patches", 0.4, 0.3, 1.0, 0.5), "dust": Region("up", 0.5, 0.2, 1.0, 0.2),
+    "sand": Region("up", 0.4, 0.2, 1.0, 0.08),
     "ivy": Region("patches", 0.5, 0.2, 0.8), "leaves": Region("patches", 0.5, 0.12, 0.8),
     "algae": Region("below", 0.4, 0.15, 1.0),
     "icing": Region("above", 0.45, 0.1, 0.6), "frosting": Region("above", 0.45, 0.1, 0.6),
     "icing sugar": Region("up", 0.45, 0.15, 1.0),
-    "cobwebs": Region("crevices", 0.25, 0.12, 1.0), "grime": Region("crevices", 0.35, 0.15, 1.0),
+    "cobwebs": Region("crevices", 0.25, 0.12, 1.0), "grime": Region("crevices", 0.35, 0.15, 1.0, 0.06),
     "barnacles": Region("below", 0.4, 0.1, 1.0), "patina": Region("crevices", 0.35, 0.14, 1.0),
     "vines": Region("patches", 0.4, 0.15, 0.9),
     "whipped cream": Region("above", 0.4, 0.1, 0.6), "blood": Region("patches", 0.3, 0.18, 0.8),
@@ -159,10 +162,11 @@ WEATHER = _weather(
     ("dirty, grimy, filthy, soiled", Weather("dirt", Region("crevices", 0.4, 0.15, 1.0), 1e-4, 0.85)),
     ("muddy", Weather("mud", Region("below", 0.3, 0.2, 1.0), 2e-4, 0.95)),
     ("weathered, aged, old, ancient, antique, vintage, "
-     "worn out", Weather("grime", Region("crevices", 0.3, 0.15, 1.0), 0.0, 0.55)),
-    ("stained, water-stained, streaky", Weather("grime", Region("streaks", 0.3, 0.14, 0.9), 0.0, 0.6)),
-    ("charred, burnt, burned, scorched, sooty", Weather("charcoal", Region("patches", 0.4, 0.3, 1.0), 0.0, 0.9)),
-    ("tarnished", Weather("tarnish", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.8)),
+     "worn out", Weather("grime", Region("crevices", 0.3, 0.15, 1.0, 0.06), 0.0, 0.55)),
+    ("stained, water-stained, streaky, rain-streaked, "
+     "water-streaked", Weather("grime", Region("streaks", 0.3, 0.14, 0.9, 0.3), 0.0, 0.6)),
+    ("charred, burnt, burned, scorched, sooty", Weather("charcoal", Region("patches", 0.4, 0.3, 1.0, 0.4), 0.0, 0.95)),
+    ("tarnished", Weather("tarnish", Region("crevices", 0.4, 0.15, 0.9, 0.08), 0.0, 0.8)),
     ("patinated, oxidised, oxidized", Weather("verdigris", Region("crevices", 0.4, 0.15, 0.9), 0.0, 0.85)),
     ("worn, battered, battle-worn, distressed, used, well-worn, worn-out", Weather("", Region("edges", 0.1, 0.06, 1.0), -1e-4)),
     ("chipped, peeling, flaking, flaky, flaked, peeled", Weather("", Region("chips", 0.2, 0.08, 0.9), -2e-4)),
@@ -170,9 +174,9 @@ WEATHER = _weather(
     ("scratched, scuffed, scraped", Weather("", Region("scratches", 0.05, 0.1, 0.9), -5e-5)),
     ("mossy, overgrown", Weather("moss", Region("crevices", 0.42, 0.18, 1.0), 3e-3)),
     ("bloody, bloodstained, blood-stained", Weather("blood", Region("patches", 0.25, 0.18, 0.9))),
-    ("dusty, sandy", Weather("dust", Region("up", 0.5, 0.2, 1.0), 1e-4, 0.6)),
+    ("dusty, sandy", Weather("dust", Region("up", 0.5, 0.2, 1.0, 0.2), 5e-5, 0.75)),
     ("frosty, frosted over, icy", Weather("frost", Region("edges", 0.35, 0.1, 1.0), 1e-3, 0.85)),
-    ("snowy", Weather("snow", Region("up", 0.42, 0.12, 0.4), 8e-3)),
+    ("snowy", Weather("snow", Region("up", 0.42, 0.12, 0.4, 0.02), 8e-3)),
 )
 """Words of wear and weather, from below: what lies lowest first."""
 
@@ -193,6 +197,9 @@ FADED = {"weathered": 0.85, "aged": 0.9, "old": 0.95, "faded": 0.7, "bleached": 
 
 WET = {"wet": 0.35, "damp": 0.6, "oily": 0.45, "slimy": 0.35}
 """Words of wetness: factor of the roughness."""
+
+SOAKED, POROUS, SOAK = frozenset(["wet", "damp"]), 0.6, 0.72
+"""Words of water, the roughness from which on a stuff drinks it, and how much darker it is then."""
 
 DETAILS = Region("edges", 0.1, 0.04, 0.1)
 """Where a part lies that no table knows."""

@@ -35,9 +35,12 @@ from stages.prior.places import (
     PARTS,
     PEELED,
     PEELS,
+    POROUS,
     PRINTED,
     SHAPES,
     SHELLED,
+    SOAK,
+    SOAKED,
     TABLE_PARTS,
     TABLES,
     WEATHER,
@@ -45,6 +48,7 @@ from stages.prior.places import (
     WHOLE,
     Region,
 )  # fmt: skip
+from stages.prior.primer import primed
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
 from stages.prior.stuffs import BOARDS, FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
 from stages.prior.text import Vocabulary
@@ -107,7 +111,7 @@ class Reading:
         coat = layers.pop(0).coat
         for phrase in over:
             layers += self._over(phrase, coat, base)
-        return Recipe(coat, tuple(_once(layers)), seed)
+        return Recipe(coat, tuple(primed(coat, _once(layers))), seed)
 
     def _phrases(self, prompt: str) -> list[Phrase]:
         """The phrases of a prompt: of the words that tables know, or where there are none, of all that may mean a material."""
@@ -246,6 +250,8 @@ class Reading:
         for word in phrase.weather:
             roughness *= WET.get(word, 1.0)
         color = _faded(np.array(_described(wanted, _color(phrase, wanted.color))), phrase)
+        if wanted.roughness > POROUS and not wanted.metallic and any(word in SOAKED for word in phrase.weather):
+            color = _triple(np.array(color) * SOAK)
         look = look_of(wanted, phrase.finish, self._looks)
         metallic = wanted.metallic
         hue = any(word in COLORS or word.startswith("#") for word in phrase.colors)

@@ -69,3 +69,21 @@ def test_a_fade_rises_from_nothing_to_all() -> None:
 def test_halves_are_where_words_say(kind: str, side: tuple[slice, ...]) -> None:
     cover = covered(Mask(kind, 0.5, 0.05, 0.0), 64)
     assert cover[side].min() == 1 and abs(cover.mean() - 0.5) < 0.02
+
+
+def test_a_boxs_walls_keep_no_snow() -> None:
+    """A share of half of a box is more than its top: walls do not make up for it."""
+    wall, top = (np.tile(np.float32(n), (2000, 1)) for n in ([1, 0, 0], [0, 0, 1]))
+    point = np.random.default_rng(0).uniform(-0.5, 0.5, (4000, 3)).astype(np.float32)
+    surface = Surface.bare(point, np.concatenate([wall, top[:1000], -top[:1000]]), 1e-3)
+    recipe = settled(Recipe(Coat("even"), (Layer(Coat("snow"), (Mask("up", 0.5, wear=0.4),)),)), surface)
+    place = Place(np.ascontiguousarray(point.T), np.zeros((2, 4000), np.float32), np.zeros(4000, np.int32), surface.footprint)
+    cover = coverage(recipe.layers[0].masks, surface, place)
+    assert cover[:2000].max() < 0.02 and cover[2000:3000].min() > 0.98 and cover[3000:].max() < 0.02
+
+
+def test_a_soft_mask_thins_out() -> None:
+    """Dust lies thinner where a surface turns away from the sky; snow ends."""
+    hard, soft = (covered(Mask("patches", 0.4, 0.3, 0.2, soft=soft), 256) for soft in (0.0, 0.4))
+    assert abs(hard.mean() - soft.mean()) < 0.08
+    assert ((soft > 0.1) & (soft < 0.9)).mean() > 2 * ((hard > 0.1) & (hard < 0.9)).mean()

@@ -249,6 +249,25 @@ def ice(at: Place) -> Look:
     )
 
 
+def dust(at: Place) -> Look:
+    """A film of house dust: pale powder in faint drifts, lint here and there."""
+    drift = fbm(at, Spectrum(0.05, 0.0006, 0.8, patch=0.5), 1)
+    powder = fbm(at, Spectrum(0.0025, 0.0002, 1.05, tails=0.5, skew=0.2, patch=0.5), 2)
+    lint = marks(at, 0.012, 0.00014, 2, 0.0, 2 * np.pi, 3, 0.6, 0.8)
+    color = shade(palette(0.5 + 0.14 * drift + 0.06 * powder, "#8b8479", "#a39a8c", "#b9b1a4"), 0.06 * powder)
+    color = mix(color, palette(lint.random(1), "#7d7770", "#d6d0c6"), 0.5 * lint.cover * (lint.random(2) < 0.25))
+    return Look(color, np.clip(0.96 + 0.02 * powder, 0, 1), 0.0, 4e-5 * drift + 1.2e-5 * powder)
+
+
+def grime(at: Place) -> Look:
+    """What hands, rain and soot leave: a dark, greasy film, blotched, thicker in specks."""
+    tone = fbm(warped(at, 0.004, 0.03, 1, 3), Spectrum(0.06, 0.0008, 0.9, tails=0.3, patch=0.5), 2)
+    speck = fbm(at, Spectrum(0.003, 0.0003, 1.05, tails=0.5, skew=-0.3, patch=0.6), 3)
+    color = palette(0.5 + 0.18 * tone + 0.08 * speck, "#241f19", "#39332a", "#52493d")
+    color = tint(shade(color, 0.10 * speck), 0.06 * noise(at, 0.03, 4))
+    return Look(color, np.clip(0.82 - 0.08 * tone + 0.04 * speck, 0, 1), 0.0, 2e-5 * tone + 1e-5 * speck)
+
+
 def ash(at: Place) -> Look:
     """A cold hearth: pale powder in soft drifts and crumbs, flakes that keep the grain of what burnt, bits of charcoal."""
     bent = warped(at, 0.003, 0.03, 1, 4)
@@ -340,9 +359,10 @@ def salt(at: Place) -> Look:
 
 LOOKS = {
     "sand": sand, "fine sand": fine_sand, "soil": soil, "cracked mud": cracked_mud, "grass": grass, "moss": moss,
-    "leaves": leaves, "snow": snow, "ice": ice, "ash": ash, "charcoal": charcoal, "coal": coal, "salt": salt,
+    "leaves": leaves, "snow": snow, "ice": ice, "dust": dust, "grime": grime, "ash": ash, "charcoal": charcoal, "coal": coal,
+    "salt": salt,
 }  # fmt: skip
 METRES = {
     "sand": 1.2, "fine sand": 0.15, "soil": 0.4, "cracked mud": 0.8, "grass": 0.5, "moss": 0.25, "leaves": 0.4,
-    "snow": 0.8, "ice": 0.8, "ash": 0.25, "charcoal": 0.2, "coal": 0.3, "salt": 0.06,
+    "snow": 0.8, "ice": 0.8, "dust": 0.25, "grime": 0.3, "ash": 0.25, "charcoal": 0.2, "coal": 0.3, "salt": 0.06,
 }  # fmt: skip
