@@ -167,6 +167,19 @@ def foil(at: Place, kind: Metal) -> Look:
                 0.03 * tilt + 0.03 * tilt_small - 1e-5 * np.clip(crease, 0, 1))  # fmt: skip
 
 
+def tarnished(at: Place, kind: Metal) -> Look:
+    """Under a film of its own oxide: thick and dark where it gathers, thin and bright where hands have been."""
+    film = fbm(warped(at, 0.02, 0.09, 1), Spectrum(0.2, 0.0006, 0.82, tails=0.2, patch=0.5), 2)
+    grain = fbm(at, Spectrum(0.003, 0.0003, 1.1, tails=0.4, patch=0.3), 3)
+    wiped = masked(warped(at.flat, 0.02, 0.1, 4), Spectrum(0.09, 0.0008, 0.85, (2, 1, 1), patch=0.4), 0.2, 5, 0.35)
+    specks = spots(warped(at, 0.001, 0.004, 6), 0.007, (0.0003, 0.0014), 0.35, 7).cover
+    thick = np.clip(0.56 + 0.17 * film + 0.06 * grain - 0.42 * wiped + 0.25 * specks, 0, 1)
+    dark, light = kind.tarnish
+    color = palette(1 - thick, "#1f1712", dark, light, kind.colors[0], kind.colors[-1])
+    rough = np.clip(0.2 + 0.34 * thick + 0.05 * grain + 0.1 * specks, 0.05, 1)
+    return Look(shade(color, 0.05 * grain), rough, 1.0 - 0.2 * thick, 8e-6 * grain + 1.5e-5 * thick)
+
+
 CAST_IRON = METALS["iron"]._replace(colors=("#58595c", "#6c6d70", "#818284"), tarnish=("#33302e", "#4b443e"), dull=0.55)
 
 FINISHES: dict[str, Callable[..., Look]] = {
@@ -177,6 +190,7 @@ LOOKS: dict[str, Substance] = {
     f"{finish} {metal}".strip(): partial(make, kind=kind) for metal, kind in METALS.items() for finish, make in FINISHES.items()
 }
 LOOKS |= {
+    **{f"tarnished {metal}": partial(tarnished, kind=METALS[metal]) for metal in ("copper", "brass", "silver")},
     "cast iron": partial(cast, kind=CAST_IRON), "galvanised steel": galvanised,
     "chrome": partial(polished, kind=METALS["steel"]),
     "gold leaf": partial(foil, kind=METALS["gold"]), "foil": partial(foil, kind=METALS["aluminium"]),
