@@ -54,8 +54,8 @@ def light(points: GBuffer, transport: Transport, c2w: NDArray) -> list[tuple[str
         cells.append((f"A, roughness {roughness}", lit(A)))
     _, B = interpolate(transport, torch.full((count,), 0.16))
     cells.append(("B, roughness 0.16", lit(B)))
-    for name, color, roughness, metallic in (("glazed blue", (0.03, 0.1, 0.4), 0.12, 0), ("brushed brass", (0.85, 0.6, 0.3), 0.36, 1)):
-        values = torch.tensor([*color, roughness, metallic], dtype=torch.float32).expand(count, 5)
+    for name, material in (("glazed blue", (0.03, 0.1, 0.4, 0.12, 0)), ("rough brass", (0.85, 0.6, 0.3, 0.36, 1))):
+        values = torch.tensor(material, dtype=torch.float32).expand(count, 5)
         cells.append((name, lit(shade(transport, Material.of(values)))))
     return [(name, image(points, np.asarray(values))) for name, values in cells]
 

@@ -24,8 +24,8 @@ def flicker(look: str, share: float = 1 / 8, supersample: int = 1, relief: float
     """RMSE between two views of a substance's square, with textures of both `SIZES`; 1 is white.
 
     A pixel of the view is as large as two texels of the smaller texture. Args: share: of the square's edge that is looked at.
-    supersample: samples along the edge of a texel of the smaller one that borders run through, as in `bake`. relief: 0 looks at the
-    colour alone.
+    supersample: samples along the edge of a texel of the smaller one that borders run through, as in `bake`. relief: 0 looks
+    at the colour alone.
     """
     small, large = (textures(look, size, share, s) for size, s in zip(SIZES, (supersample, 1), strict=True))
     pixels = round(SIZES[0] * share) // 2
