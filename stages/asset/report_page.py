@@ -21,8 +21,8 @@ from stages.asset.report_view import PageLight, box, groups, light_data, packed
 from stages.asset.webp import encode_webp
 from stages.core.artifact import sha256_file, write_text
 
-PICTURE_SIZE = 1024
-"""Longest edge of a map in the page, pixels."""
+PICTURE_SIZE, FEW = 1024, 4
+"""Longest edge of a map in the page, pixels, of so many texture sets; of more, all together have as many."""
 
 QUALITY = {"albedo": 90, "shot": 88}
 """Of lossy pictures; other maps take DATA_QUALITY, which leaves them within a few steps of 255."""
@@ -86,7 +86,7 @@ def write_page(path: Path, page: Page, files: list[str]) -> None:
     looks = distinct(model)
     mesh, count = page_mesh(model)
     streams, blob = packed(mesh, page.light)
-    sets = [maps_of(look) for look in looks]
+    sets = [maps_of(look, max(int(PICTURE_SIZE * (FEW / max(len(looks), FEW)) ** 0.5), 32)) for look in looks]
     data = {
         "streams": streams,
         "groups": groups(mesh, [looks.index(first_like(look, looks)) for look in model.looks]),
@@ -155,8 +155,8 @@ class Maps:
     width: int
 
 
-def maps_of(look: Look) -> Maps:
-    """Each map of a look, at most PICTURE_SIZE wide."""
+def maps_of(look: Look, size: int) -> Maps:
+    """Each map of a look, at most so many texels wide."""
     orm = look.packed()
     albedo = eight_bit(look.pictures["albedo"].pixels())[..., :3]
     pixels = {"albedo": albedo}
@@ -165,14 +165,14 @@ def maps_of(look: Look) -> Maps:
         pixels["occlusion"] = np.repeat(orm[..., 0:1], 3, 2)
     if "normal" in look.pictures:
         pixels["normal"] = eight_bit(look.pictures["normal"].pixels())[..., :3]
-    uris = {name: image(small(values), QUALITY.get(name, DATA_QUALITY)) for name, values in pixels.items()}
+    uris = {name: image(small(values, size), QUALITY.get(name, DATA_QUALITY)) for name, values in pixels.items()}
     return Maps(uris, albedo.shape[1])
 
 
-def small(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """At most PICTURE_SIZE along an edge."""
+def small(pixels: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
+    """At most so many pixels along an edge."""
     height, width = pixels.shape[:2]
-    share = min(1.0, PICTURE_SIZE / max(height, width))
+    share = min(1.0, size / max(height, width))
     return resized(pixels, max(1, round(width * share)), max(1, round(height * share)))
 
 

@@ -119,14 +119,17 @@ def subjects(prep: Path, mesh: Artifact, sets: list[TextureSet]) -> Iterator[Sub
         prep: what the mesh is from. sets: the mesh's first ones, with sizes.
     Raises: ArtifactError when no texel of a texture would show any surface.
     """
-    scene, open_mesh, of_triangle = traced_scene(mesh), is_open(mesh["triangles"]), triangle_sets(mesh)
+    of_triangle = triangle_sets(mesh)
+    area = np.bincount(of_triangle, np.abs(signed_area(mesh["uv"])), len(sets))
+    for chosen, of_set in zip(sets, area.tolist(), strict=False):
+        if not of_set:
+            named = f" of set {chosen.name}" if chosen.name else ""
+            raise ArtifactError(f"{prep}: its UVs cover no texel of {chosen.size}{named}; make it again with new UVs")
+    scene, open_mesh = traced_scene(mesh), is_open(mesh["triangles"])
     for number, chosen in enumerate(sets):
         mine = of_triangle == number
         layout = Layout.of(mesh["uv"], chosen.size, mesh["charts"], mine)
         touched = touched_texels(layout)
-        if not signed_area(layout.uv).any() or not (touched.triangle >= 0).any():
-            named = f" of set {chosen.name}" if chosen.name else ""
-            raise ArtifactError(f"{prep}: its UVs cover no texel of {chosen.size}{named}; make it again with new UVs")
         yield Subject(mesh, scene, open_mesh, mine, layout, touched, chosen, block(sets))
 
 

@@ -15,12 +15,15 @@ TRANSFORM = "KHR_texture_transform"
 
 
 def material_name(materials: list[dict[str, Any]], index: int) -> str:
-    """A material's name, with its number where it has none or shares it with another."""
-    name = materials[index].get("name")
-    if not name:
-        return f"material_{index}"
-    first = next(i for i, material in enumerate(materials) if material.get("name") == name)
-    return name if first == index else f"{name}_{index}"
+    """A material's name, with its number where it has none or shares it with another; no two have one."""
+    names = [material.get("name") for material in materials]
+    name = names[index]
+    if name and names.index(name) == index:
+        return name
+    made = f"{name or 'material'}_{index}"
+    while made in names:
+        made += "_"
+    return made
 
 
 def pass_on(gltf: Gltf, skip: Callable[[str], None]) -> tuple[dict[str, Any], list[bytes]]:

@@ -12,14 +12,16 @@ import torch
 from numpy.typing import NDArray
 
 from stages.asset.parts import labels
-from stages.bake.raster import covered_samples
-from stages.bake.stage import Subject
+from stages.bake.raster import Surface, covered_samples, joined
+from stages.bake.sizes import sized
+from stages.bake.stage import subjects
 from stages.bake.texels import texel_size
 from stages.bake.visibility import Views, seen_points
 from stages.conditions.stage import read_lights
 from stages.core.artifact import load_npz
 from stages.core.schemas import CAMERAS, MATERIAL, PREP
 from stages.core.shading import Transport
+from stages.core.texture_sets import texture_sets
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.lights import preview_light
@@ -62,16 +64,17 @@ class Ground:
     def of(prep: Path, conditions: Path, size: int) -> "Ground":
         """Texels of a size² bake that a view of the conditions saw. Raises: ArtifactError."""
         mesh, cameras = load_npz(prep, PREP), load_npz(conditions / "cameras.npz", CAMERAS)
-        subject = Subject.of(prep, mesh, size)
-        surface = covered_samples(subject.layout, 1, range(size))
-        surface = surface.where(surface.triangle >= 0)
-        views = Views(cameras["c2w"], cameras["fov_y"], int(cameras["width"]), int(cameras["height"]))
-        surface = surface[np.flatnonzero(seen_points(subject.scene, surface, views, subject.open))]
-        chosen = np.random.default_rng(0).permutation(len(surface.triangle))[:TEXELS]
-        some = surface[np.sort(chosen)]
         corners = mesh["vertices"][mesh["triangles"]]
+        views = Views(cameras["c2w"], cameras["fov_y"], int(cameras["width"]), int(cameras["height"]))
+        found, widths = list[Surface](), list[NDArray[np.float32]]()
+        for subject in subjects(prep, mesh, sized(texture_sets(mesh.provenance), size)):
+            surface = covered_samples(subject.layout, 1, range(size))
+            surface = surface.where(surface.triangle >= 0)
+            found.append(surface[np.flatnonzero(seen_points(subject.scene, surface, views, subject.open))])
+            widths.append(texel_size(corners, subject.layout)[found[-1].triangle])
+        chosen = np.sort(np.random.default_rng(0).permutation(sum(map(len, widths)))[:TEXELS])
+        some, width = joined(found)[chosen], np.concatenate(widths)[chosen]
         weights = np.c_[some.barycentric, 1 - some.barycentric.sum(1)].astype(np.float32)
-        width = texel_size(corners, subject.layout)[some.triangle]
         point, normal = some.interpolate(corners), some.interpolate(mesh["normals"])
         return Ground(subject.scene, point, normal, width, labels(mesh)[some.triangle], some.triangle, weights)
 

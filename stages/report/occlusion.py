@@ -36,7 +36,10 @@ class OcclusionRow:
 def report_occlusion(
     prep: Path, out: Path, options: OcclusionReportOptions, progress: Progress = silent
 ) -> list[OcclusionRow]:
-    """Measure on a mesh; write occlusion.csv and occlusion.png into a folder. Raises: ArtifactError."""
+    """Measure on a mesh, on its first texture set; write occlusion.csv and occlusion.png into a folder.
+
+    Raises: ArtifactError.
+    """
     mesh = load_npz(prep, PREP)
     subject = Subject.of(prep, mesh, options.size)
     on_chart = subject.touched.triangle >= 0

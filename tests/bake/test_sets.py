@@ -6,8 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from stages.asset.export import EXTRAS, export
 from stages.asset.folder import read_asset
+from stages.asset.options import ExportOptions
 from stages.asset.read_glb import read_model
+from stages.bake import stage
 from stages.bake.options import BakeOptions
 from stages.bake.raster import Layout, touched_texels
 from stages.bake.sizes import MOST, block, means, sized
@@ -17,6 +20,7 @@ from stages.core.errors import ArtifactError
 from stages.core.images import read_image
 from stages.core.schemas import ASSET, PREP
 from stages.core.texture_sets import TextureSet, map_files, texture_sets, triangle_sets
+from stages.light.textured_model import TexturedModel
 from stages.report.baked import read_baked
 from tests.asset.glb import Glb
 from tests.asset.test_models import khronos_issues
@@ -41,10 +45,17 @@ def divided() -> Example:
 def assets(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same cube and material, with two sets and with one atlas."""
     folder = tmp_path_factory.mktemp("sets")
-    for name, example in (("sets", divided()), ("one", cube().with_(source_format="obj"))):
-        prep = save_prep(folder / f"{name}.npz", example)
-        bake(prep, save_material(folder / f"{name}_material.npz", prep, small_residual()), folder / name, SMALL)
+    with pytest.MonkeyPatch.context() as patch:
+        for name, example in (("sets", divided()), ("one", cube().with_(source_format="obj"))):
+            prep = save_prep(folder / f"{name}.npz", example)
+            bake(prep, save_material(folder / f"{name}_material.npz", prep, small_residual()), folder / name, SMALL)
+            patch.setattr(stage, "report_page", blank)  # nobody reads the other's
     return folder
+
+
+def blank(out: Path, *args: object) -> str:
+    (out / "report.html").write_text("")
+    return "report.html"
 
 
 def test_each_set_has_its_files_and_the_manifest_lists_them(assets: Path) -> None:
@@ -118,6 +129,41 @@ def test_readers_of_assets_know_the_sets(assets: Path) -> None:
     assert "2 texture sets of 512 texels" in page and "shell: albedo" in page and "visor: roughness" in page
 
 
+def test_a_textured_model_has_each_set_s_material(assets: Path) -> None:
+    """What `eval` and a reference material read: in the middle of each face, as the masters say."""
+    mesh = load_npz(assets / "sets.npz", PREP)
+    middle = mesh["vertices"][mesh["triangles"]].mean(1)
+    model = TexturedModel(assets / "sets" / "model.glb", mesh["to_world"])
+    found, there = model.material_at(middle, middle + mesh["normals"][:, 0])
+    assert there.all()
+    for number, chosen in enumerate(SETS):
+        color = read_exr(assets / "sets" / chosen.file("albedo.exr")).channels
+        mine = np.flatnonzero(triangle_sets(mesh) == number)
+        u, v = np.moveaxis(mesh["uv"][mine].mean(1) % 1, -1, 0)
+        row, column = ((1 - v) * 512).astype(int), (u * 512).astype(int)
+        stored = np.stack([color[c][row, column] for c in "RGB"], 1)
+        assert np.abs(found[mine, :3] - stored).max() < 0.05  # texels differ by as much from one to the next
+
+
+EACH = {
+    "unreal": ("T_thing_{}_BC.png", "T_thing_{}_ORM.png"),
+    "unity-hdrp": ("thing_{}_BaseMap.png", "thing_{}_MaskMap.png"),
+    "unity-urp": ("thing_{}_BaseMap.png", "thing_{}_MetallicSmoothness.png", "thing_{}_Occlusion.png"),
+    "usd": ("textures/thing_{}_albedo.png", "textures/thing_{}_orm.png"),
+    "materialx": ("textures/thing_{}_albedo.png", "textures/thing_{}_orm.png"),
+}
+"""Files that a target has of each set."""
+
+
+@pytest.mark.parametrize("target", EACH)
+def test_exports_have_files_for_each_set(assets: Path, tmp_path: Path, target: str) -> None:
+    for name, (module, _) in EXTRAS.items():
+        if name == target:
+            pytest.importorskip(module)
+    files = set(export(assets / "sets", tmp_path / "out", ExportOptions(target)).sizes)
+    assert {words.format(name) for words in EACH[target] for name in ("shell", "1002")} <= files
+
+
 def test_a_set_without_texels_is_named(tmp_path: Path) -> None:
     example = divided()
     uv = example.loop_uv.copy()
@@ -126,6 +172,7 @@ def test_a_set_without_texels_is_named(tmp_path: Path) -> None:
     material = save_material(tmp_path / "material.npz", prep, small_residual())
     with pytest.raises(ArtifactError, match=r"prep\.npz: its UVs cover no texel of 512 of set 1002; make it again"):
         bake(prep, material, tmp_path / "asset", SMALL)
+    assert not list((tmp_path / "asset").glob("*.exr"))
 
 
 def test_sizes_follow_the_share_of_the_surface() -> None:
