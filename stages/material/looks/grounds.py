@@ -195,9 +195,9 @@ def leaves(at: Place) -> Look:
         tone = shade(tone, 0.12 * mottle + 0.08 * grit + 0.38 * vein + 0.7 * rib - 0.16 * curl + 0.3 * (leaf.random(2) - 0.5))
         tone = tint(tone, 0.2 * (leaf.random(3) - 0.5) - 0.04 * vein)
         under = (
-            np.exp(-np.maximum(side - outline, 0) / 0.12) * (abs(leaf.across) < 2) * whole
-        )  # the shadow beside an upper leaf
-        color = mix(shade(color, -0.4 * under), tone, here * (1 - hole))
+            np.exp(-np.maximum(side - outline, 0) / 0.3) * (abs(leaf.across) < 2) * whole * (0.3 + 1.4 * leaf.random(7))
+        )  # the shadow beside an upper leaf: it lies close or stands off
+        color = mix(shade(color, -0.3 * under), tone, here * (1 - hole))
         height = mix(
             height, -0.004 + 0.0025 * k + 0.002 * curl * (leaf.random(4) - 0.2) + 4e-4 * rib + 2e-4 * vein, here * (1 - hole)
         )

@@ -250,20 +250,20 @@ def meat(at: Place) -> Look:
 
 
 def orange_peel(at: Place) -> Look:
-    """The rind of an orange: domes round oil glands, a pore sunk in the middle of each, waxy."""
-    bent = warped(at, 0.0006, 0.006, 1, 2)
-    gland = pebbles(bent, 0.0026, 0.0, 0.75, 2, 0.75)
-    shown = fading(0.0026, at.footprint)
-    pit = np.exp(-((gland.cells.near / (0.0005 + 0.0004 * gland.cells.random(1))) ** 2)) * shown
-    cloud = fbm(at, Spectrum(0.05, 0.002, 0.85, patch=0.4), 3)
-    fine = fbm(at, Spectrum(0.0012, 0.00012, 1.0, tails=0.4, skew=0.1, patch=0.4), 4)
-    own = (gland.cells.random(2) - 0.5) * shown
-    color = palette(
-        0.5 + 0.08 * cloud + 0.12 * own + 0.15 * (gland.dome - 0.7) + 0.05 * fine, "#d9660a", "#ee7f12", "#f7972a", "#fbb04e"
-    )
-    color = shade(color, 0.05 * fine - 0.6 * (pit - 0.12))
-    height = 1.4e-4 * (gland.dome - 0.7) - 2.8e-4 * (pit - 0.12) + 4e-6 * fine + 3e-5 * cloud
-    return Look(tint(color, 0.05 * cloud), np.clip(0.36 + 0.04 * fine + 0.12 * pit, 0.05, 1), 0.0, height)
+    """The rind of an orange: soft swells between round dimples of many sizes, each over an oil gland that shows dark, waxy."""
+    bent = warped(at, 0.0003, 0.004, 1, 2)
+    large, small = spots(bent, 0.0024, (0.0006, 0.0013), 0.97, 2), spots(bent, 0.0013, (0.0003, 0.0007), 0.8, 3)
+    seen, fine_seen = fading(0.0014, at.footprint), fading(0.0007, at.footprint)
+    dimple = np.exp(-np.square(large.cells.near / (0.75 * large.radius))) * seen
+    prick = np.exp(-np.square(small.cells.near / (0.8 * small.radius))) * fine_seen
+    cloud = fbm(at, Spectrum(0.05, 0.002, 0.85, patch=0.4), 4)
+    swell = fbm(at, Spectrum(0.004, 0.0012, 0.7), 5)
+    fine = fbm(at, Spectrum(0.0012, 0.00012, 1.05, tails=0.4, skew=0.1, patch=0.4), 6)
+    sunk = 0.7 * (dimple - 0.2 * seen) + 0.3 * (prick - 0.2 * fine_seen)
+    color = palette(0.52 + 0.08 * cloud - 0.35 * sunk + 0.05 * fine, "#d25c06", "#ea7a10", "#f69427", "#fbb04e")
+    color = shade(color, 0.07 * fine - 0.35 * sunk)
+    height = 6e-5 * swell - 2.6e-4 * sunk + 4e-6 * fine + 3e-5 * cloud
+    return Look(tint(color, 0.05 * cloud), np.clip(0.34 + 0.05 * fine + 0.16 * sunk, 0.05, 1), 0.0, height)
 
 
 def tomato_skin(at: Place) -> Look:

@@ -12,7 +12,6 @@ from stages.material.patterns import (
     Spectrum,
     cells,
     cracks,
-    edge,
     exceeds,
     fading,
     fbm,
@@ -248,34 +247,28 @@ def basalt(at: Place) -> Look:
     return Look(color, 0.82 + 0.05 * grit + 0.07 * hole, 0.0, height)
 
 
+CHIPS = Pieces(0.85, 0.5, 0.7, 0.0, 1.0, 0.8, 0.5, 0.0)
+"""Broken marble, ground flat."""
+
+
 def terrazzo(at: Place) -> Look:
-    """Chips of marble in cement, ground flat and polished: three sizes of broken pieces, the larger over the smaller."""
-    grain = fbm(at, Spectrum(0.003, 0.0004, 1.0, tails=0.4, patch=0.3), 1)
+    """Chips of marble in cement, ground flat and polished: broken pieces of three sizes, veined and clouded, some clear at
+    their rims, splinters and sand between."""
+    grain = fbm(at, Spectrum(0.003, 0.0004, 1.0, tails=0.4, skew=-0.15, patch=0.4), 1)
     cloud = fbm(at, Spectrum(0.3, 0.01, 0.8), 2)
-    color = shade(palette(0.5 + 0.2 * cloud, "#cfc8bd", "#dbd5cb", "#e4dfd6"), 0.05 * grain)
-    chip = np.zeros(len(at), np.float32)
-    for k, (size, share) in enumerate(((0.006, 0.55), (0.013, 0.5), (0.028, 0.42))):
-        bent = warped(at, 0.03 * size, 0.5 * size, 3 + k, 3)
-        piece = cells(bent, size, 6 + k, 1.0, (1.25, 0.9, 1))
-        shown = fading(size, at.footprint)
-        here = edge(piece.border - size * (0.05 + 0.12 * piece.random(1)), at.footprint) * (piece.random(2) < share)
-        here = here * shown + 0.45 * share * (1 - shown)
-        vein = abs(fbm(bent, Spectrum(1.5 * size, 0.2 * size, 0.7, (1, 0.5, 1)), 9 + k))
-        stone = each(
-            piece.random(3),
-            shown,
-            "#5d5650",
-            "#8d7a68",
-            "#b5563f",
-            "#c99a73",
-            "#e9e2d6",
-            "#f1ece2",
-            "#a9a49c",
-            "#77857c",
-            "#4a4d50",
-        )
-        stone = tint(shade(stone, 0.05 * grain + 0.10 * np.exp(-6 * vein) - 0.03), 0.1 * (piece.random(4) - 0.5) * shown)
-        color, chip = mix(color, stone, here), np.maximum(chip, here)
+    color = shade(palette(0.5 + 0.2 * cloud, "#cfc6b8", "#dcd4c8", "#e6e0d6"), 0.06 * grain)
+    chip, vein = np.zeros(len(at), np.float32), fbm(at, Spectrum(0.02, 0.001, 0.75, (1, 0.5, 1)), 3)
+    for k, (size, radius) in enumerate(((0.0045, 0.75), (0.012, 0.72), (0.028, 0.62))):
+        piece = heap(at, size, CHIPS._replace(radius=radius), 4 + k, (1.2, 0.9, 1))
+        own = each(
+            piece.random(3), piece.shown,
+            "#8a7866", "#b39c84", "#c9b49a", "#e9e2d6", "#f1ece2", "#c3bdb3", "#a9a49c", "#b87f63", "#d8c7b0", "#6f6a64",
+        )  # fmt: skip
+        mottle = (0.08 * vein + 0.10 * np.exp(-np.square(vein / 0.12))) * (0.3 + 1.4 * piece.random(4))
+        own = tint(shade(own, mottle + 0.06 * grain - 0.04), 0.1 * (piece.random(5) - 0.5) * piece.shown)
+        clear = np.clip(0.55 + piece.height / (0.5 * size), 0, 1)  # thin rims let the cement through
+        here = piece.cover * mix(1.0, clear, (piece.random(6) < 0.4) * piece.shown)
+        color, chip = mix(color, own, here), np.maximum(chip, here)
     return Look(color, 0.26 - 0.1 * chip + 0.03 * grain, 0.0, 1.2e-5 * (chip - 0.6) + 4e-6 * grain)
 
 

@@ -344,9 +344,9 @@ def panel(at: Place, length: float, width: float, layers: int, *stops: str) -> L
             np.sin(9 * side + 5 * flake.random(2) + 0.8 * grit) + np.sin(23 * side + 9 * flake.random(3) + 3 * flake.along)
         ) * fading(0.15 * width, at.footprint)
         tone = shade(each(flake.random(1), whole, *stops), 0.09 * grain + 0.08 * grit)
-        shadow = np.exp(-np.clip(1 - abs(side), 0, 1) / 0.10) * whole
-        color = mix(color, tint(shade(tone, -0.25 * shadow), 0.12 * (flake.random(4) - 0.5)), here)
-        height = mix(height, 1e-4 * k + 1e-4 * side * (flake.random(5) - 0.5) + 6e-6 * grain + 8e-6 * grit, here)
+        shadow = np.exp(-np.clip(1 - abs(side), 0, 1) / 0.2) * whole * flake.random(6)  # some lie flat, some lift at a side
+        color = mix(color, tint(shade(tone, -0.2 * shadow), 0.12 * (flake.random(4) - 0.5)), here)
+        height = mix(height, 5e-5 * k + 8e-5 * side * (flake.random(5) - 0.5) + 6e-6 * grain + 8e-6 * grit, here)
     return Look(color, np.clip(0.62 + 0.05 * grit, 0, 1), 0.0, height)
 
 
