@@ -36,6 +36,9 @@ MAP_BACKDROP = (0.16, 0.18, 0.22)
 RAYS = Quality(lobe=16, light=6, extra=False)
 """Rays that a point traces, a quarter of its pixel."""
 
+GAP = 2
+"""Pixels between the maps of several sets."""
+
 TILE, MARGIN = 640, 16
 """Points along an edge that are traced at once, which bounds memory, and how many around them know of each other's noise."""
 
@@ -221,9 +224,10 @@ def atlases(maps: list[NDArray[np.float32]], size: int) -> NDArray[np.float32]:
     edge = size // across
     sheet = np.empty((size, size, 3), np.float32)
     sheet[:] = MAP_BACKDROP
+    inner = max(edge - (GAP if across > 1 else 0), 1)
     for number, one in enumerate(maps if edge else []):
         row, column = edge * (number // across), edge * (number % across)
-        sheet[row : row + edge, column : column + edge] = atlas(one, edge)
+        sheet[row : row + inner, column : column + inner] = atlas(one, inner)
     return sheet
 
 

@@ -85,22 +85,23 @@ def unusable(triangles: NDArray, uv: NDArray, area: NDArray, sets: NDArray) -> s
 
 
 def keep(
-    triangles: NDArray, uv: NDArray, area: NDArray, sets: NDArray, missing: NDArray, new: NDArray | None = None
-) -> Kept:
+    triangles: NDArray, uv: NDArray, area: NDArray, sets: NDArray, missing: NDArray, new: NDArray | None = None,
+    home: NDArray | int = 0,
+) -> Kept:  # fmt: skip
     """Charts of a layout that is kept, and what is unusual of it.
 
     Args:
         triangles: (F, 3). uv: (F, 3, 2) finite. area: (F,) in space. sets: (F,) texture of each. missing: (F,) faces without
-        UVs in the file. new: (F,) faces that were given charts of their own.
+        UVs in the file. new: (F,) faces that were given charts of their own. home: (F, 2) tiles where they are meant to lie.
     """
     told, lost = ["kept"], flat(uv) & ~missing
     if new is not None and new.any():
         told.append(f"{_faces(new)} mended, with charts in free space")
         missing = missing & ~new
     low, count = tiles(uv)
-    outside = (low != 0).any(1) | (count != 1).any(1)
+    outside = (low != home).any(1) | (count != 1).any(1)
     if outside.any():
-        told.append(f"{_faces(outside)} outside the unit square, whose textures repeat")
+        told.append(f"{_faces(outside)} outside the {'unit square' if np.all(home == 0) else 'tile'}, whose textures repeat")
     if lost.any():
         told.append(f"{_faces(lost)} without area in UV, each shows the texel that it touches")
     if missing.any():

@@ -48,6 +48,11 @@ class Divided:
     sets: list[TextureSet]
     told: str
 
+    def homes(self) -> NDArray[np.int64]:
+        """The tile (u, v) of each set, (sets, 2); the unit square where it has none."""
+        place = np.array([FIRST_TILE if one.tile is None else one.tile for one in self.sets]) - FIRST_TILE
+        return np.stack([place % ACROSS, place // ACROSS], 1)
+
 
 @dataclass(frozen=True)
 class Laid:

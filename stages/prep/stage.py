@@ -194,10 +194,10 @@ def _texture(
     if problem is None:
         uv = loop_uvs(source)
         uv[working.loops] = sound(uv[working.loops])
-        for rows in mine:
+        for rows, home in zip(mine, sets.homes(), strict=True):
             loops, triangles = working.loops[rows], working.triangles[rows]
             if options.uv == "mend":
-                uv[loops] = _mended(uv[loops], working.vertices, triangles, polygon[rows], path)
+                uv[loops] = _mended(uv[loops], working.vertices, triangles, polygon[rows], path, home)
             uv[loops] = with_neighbours(uv[loops], triangles, polygon[rows])
         return _everywhere(like_the_first(source, uv), working), {"unwrap": "kept", "gutter": None}
     made, ways = np.full((len(source.loop_vertex), 2), np.nan, np.float32), list[tuple[str, int]]()
@@ -214,13 +214,16 @@ def _texture(
     return made, {"unwrap": method, "gutter": min(gutter for _, gutter in ways)}
 
 
-def _mended(uv: NDArray, vertices: NDArray, triangles: NDArray, polygon: NDArray, path: Path) -> NDArray[np.float32]:
-    """UVs (F, 3, 2) in which all faces have texels. Raises: InputError."""
+def _mended(
+    uv: NDArray, vertices: NDArray, triangles: NDArray, polygon: NDArray, path: Path, home: NDArray
+) -> NDArray[np.float32]:
+    """UVs (F, 3, 2) in which all faces have texels, new ones in the tile (2,) that is their home. Raises: InputError."""
     made = mended(vertices, triangles, polygon, uv)
     if made is None:
         remedy = "--uv keep lets them show a neighbour's texel, --uv new makes new ones"
         raise InputError(f"{path}: its UVs leave no room for the faces that have none; {remedy}")
-    return made
+    new = ~np.asarray((made == uv).all((1, 2)))
+    return made + np.float32(home) * new[:, None, None]
 
 
 def _charts(source: Source, working: Working, sets: Divided, uv: NDArray, problem: str | None) -> Kept:
@@ -234,7 +237,7 @@ def _charts(source: Source, working: Working, sets: Divided, uv: NDArray, proble
     given = sound(loop_uvs(source)[working.loops])
     missing = ~np.asarray(np.isfinite(given).all((1, 2)))
     new = ~flat(uv) & (missing | (given != uv).any((1, 2)))
-    found = keep(working.triangles, uv, area, of_triangle, missing, new)
+    found = keep(working.triangles, uv, area, of_triangle, missing, new, sets.homes()[of_triangle])
     return replace(found, told=[*found.told, *told(source)])
 
 

@@ -149,6 +149,18 @@ def test_faces_without_texels_go_with_a_neighbour_of_their_slot(tmp_path: Path) 
     assert (np.abs(near - made["uv"][face, 0]).max(1) == 0).sum() > 3  # a texel of its neighbours
 
 
+def test_what_is_mended_lies_in_its_tile(tmp_path: Path) -> None:
+    """And faces in their tiles are not told to be outside of the square."""
+    one, two = fields(parts(2), (0.04, 0.04), (1.04, 1.04), size=0.6)
+    lost = two[1].copy()
+    lost[3] = lost[3, :1]
+    made = prepared(tmp_path, [one, (two[0], lost)], uv="mend", textures="udim")
+    assert names(made) == [".1001", ".1012"]
+    tile = np.floor(made["uv"].mean(1))
+    np.testing.assert_array_equal(tile, triangle_sets(made)[:, None] * (1, 1))
+    assert made.provenance.extra["findings"]["uv"].split("; ")[1:] == ["2 of 222 faces mended, with charts in free space"]
+
+
 def test_slots_that_meet_have_charts_of_their_own(tmp_path: Path) -> None:
     """Two halves of one ball share vertices and, in part, UVs."""
     points, uv = at(ball(6, 12), (0.0, 0.0), (1.0, 1.0))
