@@ -124,7 +124,7 @@ campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random mo
 hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through prep within their time (half an hour)
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.prep.hostile
 
-uvs: $(VENV)/.ready | $(CYCLES)  ## models laid out in fifteen ways: UVs kept bit for bit, and the same picture in Cycles (half an hour)
+uvs: $(VENV)/.ready | $(CYCLES)  ## models laid out in seventeen ways: UVs kept bit for bit, and the same picture in Cycles (half an hour)
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.uv_campaign -o uvs $$(cat $(CYCLES))
 
 parts: $(VENV)/.ready  ## parts with prompts of their own on real models below ASSETS, held against what their words mean
