@@ -32,6 +32,8 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
     stages: tuple[str, ...] = STAGES
     if mesh.suffix.lower() == ".npz":
         prep, stages = mesh, STAGES[1:]
+        if any(name == "prep" and text.strip() for name, text in further):
+            raise click.UsageError(f"--with prep: {mesh} is prepared already; give its options to dreammat prep")
     arguments = {
         "prep": [mesh, "-o", prep],
         "conditions": [prep, "-o", conditions],

@@ -273,9 +273,10 @@ def write_set(out: Path, subject: Subject, maps: Maps, progress: Progress) -> Sh
 
 
 def shown_look(subject: Subject, shown: list[Shown]) -> Look:
-    """The mesh with the materials and the normals that the asset's own maps give it."""
+    """The mesh by itself, as a viewer has it, with the materials and the normals that the asset's own maps give it."""
     normals = [of.normal for of in shown if of.normal is not None]
-    scene = subject.scene.bumped(baked_bumps(subject.mesh, normals)) if normals else subject.scene
+    scene = subject.scene.alone()
+    scene = scene.bumped(baked_bumps(subject.mesh, normals)) if normals else scene
     return Look.of(subject.mesh, scene, [of.material for of in shown])
 
 

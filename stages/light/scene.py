@@ -140,6 +140,12 @@ class Scene:
         other.bumps = bumps
         return other
 
+    def alone(self) -> "Scene":
+        """The same mesh, and the same trees, without casters."""
+        other = copy(self)
+        other._any, other._casters = self._own, None
+        return other
+
     def shading_normal(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
         """Unit interpolated normal, leaning as the normal maps say. Args: (P,), (P, 3). Returns: (P, 3)."""
         n = self.smooth_normal(triangle, barycentric)

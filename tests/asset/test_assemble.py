@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,9 @@ from dreammat_cli.main import cli
 from stages.asset.assemble import assemble
 from stages.bake.options import BakeOptions
 from stages.bake.stage import bake
+from stages.core.artifact import load_npz, read_manifest, save_npz, write_manifest
 from stages.core.errors import ArtifactError, DreammatError, InputError, OutputError
+from stages.core.schemas import ASSET, PREP
 from stages.edit.options import EditOptions
 from stages.edit.stage import edit
 from stages.prep.options import PrepOptions
@@ -58,6 +61,16 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     split(room(folder / "room.glb"), folder / "jobs", FAST)
     for name, color in (("stool", (0.6, 0.2, 0.1)), ("cup", (0.1, 0.2, 0.6))):
         baked_blank(folder / "jobs" / name / "prep.npz", folder / "jobs" / name / "asset", color)
+    return folder
+
+
+def transplanted(asset: Path, prep: Path, folder: Path) -> Path:
+    """The files of an asset as one of another mesh."""
+    shutil.copytree(asset, folder)
+    provenance, files = read_manifest(folder, ASSET)
+    (folder / "mesh.npz").unlink()
+    shutil.copyfile(prep, folder / "mesh.npz")
+    write_manifest(folder, ASSET, provenance, list(files))
     return folder
 
 
@@ -111,29 +124,32 @@ def test_assets_elsewhere_leave_the_others_empty_and_edits_count(scene: Path, tm
     assert not assemble([tmp_path / "red"], tmp_path / "a.glb").up_to_date
 
 
-def test_instances_of_one_node_come_back(tmp_path: Path) -> None:
+def test_instances_of_one_node_come_back(scene: Path, tmp_path: Path) -> None:
     """EXT_mesh_gpu_instancing stays on its node."""
     built = GltfBuilder()
     shift = built.accessor(np.float32([(0, 0, 5), (0, 0, 8)]), "VEC3")
     extension = {"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": shift}}}
     built.mesh([solid(built, cube_shape(), (1, 1, 1))], name="many", extensions=extension, translation=[1, 2, 3])
     split(built.write(tmp_path / "a.glb"), tmp_path / "jobs", FAST)
-    job = tmp_path / "jobs" / "many"
-    baked_blank(job / "prep.npz", job / "asset")
-    assemble([job / "asset"], tmp_path / "b.glb")
-    before, after = read_gltf(tmp_path / "a.glb"), read_gltf(tmp_path / "b.glb")
-    np.testing.assert_array_equal(*(s.placed_vertices()[s.loop_vertex] for s in (before, after)))
-    assert after.applied == {"instances": 2}
+    asset = transplanted(baked(scene)[0], tmp_path / "jobs" / "many" / "prep.npz", tmp_path / "many")
+    assemble([asset], tmp_path / "b.glb")
+    glb = Glb.read(tmp_path / "b.glb")
+    (node,) = glb.root["nodes"]
+    assert (node["name"], node["translation"], node["mesh"]) == ("many", [1, 2, 3], 0)
+    (column,) = node["extensions"]["EXT_mesh_gpu_instancing"]["attributes"].values()
+    np.testing.assert_array_equal(glb.accessor(column), [(0, 0, 5), (0, 0, 8)])
+    assert read_gltf(tmp_path / "b.glb").applied == {"instances": 2}
 
 
 def test_bad_input_is_one_line(scene: Path, tmp_path: Path) -> None:
     stool, cup = baked(scene)
     other, alone = tmp_path / "other", tmp_path / "alone"
-    garden = room(tmp_path / "garden.glb")
-    garden.write_bytes(garden.read_bytes().replace(b'"room"', b'"yard"'))
-    split(garden, tmp_path / "jobs", FAST)
-    for prep, asset in ((save_prep(tmp_path / "prep.npz", cube()), alone), (tmp_path / "jobs" / "lamp" / "prep.npz", other)):
-        baked_blank(prep, asset)
+    found = load_npz(stool / "mesh.npz", PREP)
+    elsewhere = found.provenance.extra["scene"] | {"name": "garden.glb", "source": "1" * 64}
+    garden = replace(found.provenance, extra=found.provenance.extra | {"scene": elsewhere})
+    save_npz(tmp_path / "garden.npz", PREP, found.arrays, garden)
+    transplanted(stool, save_prep(tmp_path / "prep.npz", cube()), alone)
+    transplanted(stool, tmp_path / "garden.npz", other)
     shutil.copytree(stool, tmp_path / "again")
     cases: list[tuple[type[DreammatError], str, list[Path], Path]] = [
         (InputError, "alone: no object of a scene; expected assets of jobs", [stool, alone], tmp_path / "a.glb"),

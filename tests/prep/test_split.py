@@ -65,6 +65,7 @@ def test_casters_take_light_away_and_are_not_seen(jobs: Path) -> None:
     assert scene.intersect(above, down).mask.all()
     beside = np.array([[1.5, 0, 0.0]])  # nothing but the floor below, seen from it
     assert scene.occluded(beside, down).all() and not scene.hidden(beside, down).any()
+    assert not scene.alone().occluded(beside, down).any()
     assert not scene.intersect(beside, down).mask.any() and not scene.occluded(beside, up).any()
 
 
