@@ -40,18 +40,18 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
         "distill": [conditions, "--prompt", prompt, "-o", material],
         "bake": [prep, material, "-o", output / "asset"],
     }
-    contexts = []
+    contexts: dict[str, click.Context] = {}
     for stage in stages:  # all options are read before anything long begins
         options = [word for name, text in further if name == stage for word in split(text)]
         words = [*map(str, arguments[stage]), *options, *common.flags()]
-        contexts.append(import_module(f"dreammat_cli.{stage}").command.make_context(f"dreammat {stage}", words))
-    for number, context in enumerate(contexts, 1):
+        contexts[stage] = import_module(f"dreammat_cli.{stage}").command.make_context(f"dreammat {stage}", words)
+    for number, (stage, context) in enumerate(contexts.items(), 1):
+        if stage == "conditions" and not common.dry_run:
+            expect_parts(prep, contexts["distill"].params["parts"])
         if not (common.quiet or common.as_json):
-            click.echo(f"[{number} of {len(stages)}] {stages[number - 1]}", err=True)
+            click.echo(f"[{number} of {len(stages)}] {stage}", err=True)
         with context:
             context.command.invoke(context)
-        if STAGES[number - 1] == "prep" and not common.dry_run:
-            expect_parts(prep, contexts[STAGES.index("distill")].params["parts"])
 
 
 def expect_parts(prep: Path, asked: tuple[tuple[str, str], ...]) -> None:

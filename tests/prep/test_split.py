@@ -136,10 +136,17 @@ def test_the_later_of_two_prompts_counts(tmp_path: Path) -> None:
     assert prompts_of(objects, read_prompts(tmp_path / "p.toml"), tmp_path) == {"aa": "oak", "ab": "elm"}
 
 
-def test_a_job_is_run_without_preparing_it_again(tmp_path: Path) -> None:
+def test_a_job_is_run_without_preparing_it_again(jobs: Path, tmp_path: Path) -> None:
     words = ["run", str(tmp_path / "prep.npz"), "--prompt", "oak", "-o", str(tmp_path), "--dry-run"]
     said = CliRunner().invoke(cli, words, catch_exceptions=False).output
     assert "would prepare" not in said and "[1 of 3] conditions" in said
+    prep = str(jobs / "jobs" / "stool" / "prep.npz")
+    words = ["run", prep, "--prompt", "oak", "-o", str(tmp_path), "--with", "distill", "--part wheel rubber"]
+    result = CliRunner().invoke(cli, words)
+    assert isinstance(result.exception, InputError) and "wheel" in str(result.exception)  # before anything long begins
+    assert not list(tmp_path.iterdir())
+    result = CliRunner().invoke(cli, ["run", prep, "--prompt", "oak", "-o", str(tmp_path), "--with", "prep", "--uv new"])
+    assert result.exit_code == 2 and "is prepared already" in result.output
 
 
 @pytest.mark.parametrize("words", [[], ["-o", "p.npz", "--split", "jobs"], ["-o", "p.npz", "--prompts", "p.toml"]])
