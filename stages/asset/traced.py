@@ -35,7 +35,7 @@ def source_bumps(prep: Artifact) -> NormalMaps | None:
     maps = [normal_map(passed_on, textures[name]) for name in names]
     of_part = _rows(prep, names)
     bumps = world_frames(prep, set(np.flatnonzero(of_part >= 0).tolist()))
-    return replace(bumps, maps=maps, of_triangle=of_part[_part_of_triangle(prep)])
+    return replace(bumps, maps=maps, of_triangle=of_part[triangle_parts(prep)])
 
 
 def source_emission(prep: Artifact) -> Emission | None:
@@ -45,7 +45,7 @@ def source_emission(prep: Artifact) -> Emission | None:
     if not shining:
         return None
     textures = [emissive_texture(passed_on, of) for of in shining.values()]
-    of_triangle = _rows(prep, list(shining))[_part_of_triangle(prep)]
+    of_triangle = _rows(prep, list(shining))[triangle_parts(prep)]
     return Emission(textures, of_triangle, gltf_uv(prep)[prep["triangle_loops"]])
 
 
@@ -110,7 +110,8 @@ def _rows(prep: Artifact, names: list[str]) -> NDArray[np.int32]:
     return np.array([names.index(part["material"]) if part["material"] in names else -1 for part in _parts(prep)], np.int32)
 
 
-def _part_of_triangle(prep: Artifact) -> NDArray:
+def triangle_parts(prep: Artifact) -> NDArray[np.int32]:
+    """Part of each triangle of the working mesh, (F,)."""
     return loop_parts(prep)[prep["triangle_loops"][:, 0]]
 
 

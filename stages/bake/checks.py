@@ -127,15 +127,23 @@ def density(mesh: Artifact, size: NDArray[np.int64]) -> Check:
     return Check("Texel density", f"{rounded(middle)} per unit", state, note)
 
 
-def islands(mesh: Artifact) -> NDArray[np.int32]:
-    """The UV island of each triangle: those that share a vertex with its UV hang together. Returns: (F,), from 0."""
-    bits = np.ascontiguousarray(mesh["uv"]).view(np.uint64).reshape(-1)
-    corner = np.stack([mesh["triangles"].reshape(-1).astype(np.uint64), bits], 1)
+def islands(mesh: Artifact, mine: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """The UV island of each triangle: those that share a vertex with its UV hang together.
+
+    Args:
+        mine: (F,) triangles that are asked about.
+    Returns:
+        (F,), from 0; -1 of others.
+    """
+    bits = np.ascontiguousarray(mesh["uv"][mine]).view(np.uint64).reshape(-1)
+    corner = np.stack([mesh["triangles"][mine].reshape(-1).astype(np.uint64), bits], 1)
     _, vertex = np.unique(corner, axis=0, return_inverse=True)
     a, b, c = vertex.reshape(-1, 3).T
     pairs = np.concatenate([a, b]), np.concatenate([b, c])
     graph = coo_matrix((np.ones(2 * len(a), np.int8), pairs), (int(vertex.max()) + 1,) * 2)
-    return connected_components(graph, directed=False)[1][a].astype(np.int32)
+    result = np.full(len(mine), -1, np.int32)
+    result[mine] = connected_components(graph, directed=False)[1][a]
+    return result
 
 
 def gutter(found: int | None) -> Check:

@@ -21,7 +21,7 @@ from stages.asset.model import source_model
 from stages.asset.parts import labels
 from stages.asset.passed_on import PassedOn
 from stages.asset.textures import write_textures
-from stages.asset.traced import baked_bumps, traced_scene, world_frames
+from stages.asset.traced import baked_bumps, traced_scene, triangle_parts, world_frames
 from stages.asset.wavefront import write_obj
 from stages.bake.checks import Facts, islands
 from stages.bake.evaluate import evaluate
@@ -239,9 +239,9 @@ def with_normals(subject: Subject, maps: Maps) -> Maps:
     if maps.height is None:
         return maps
     mesh, touched = subject.mesh, subject.touched
-    corners, frames = mesh["vertices"][mesh["triangles"]], world_frames(mesh)
+    frames = world_frames(mesh, set(np.unique(triangle_parts(mesh)[subject.triangles]).tolist()))
     normals = relief_normals(
-        maps.height, touched, subject.layout, mesh["charts"], (corners, mesh["normals"]), frames, subject.scene.bumps
+        maps.height, touched, subject.layout, mesh["charts"], (subject.corners, mesh["normals"]), frames, subject.scene.bumps
     )  # fmt: skip
     pad(touched.triangle >= 0, normals)
     return replace(maps, normal=normals)
@@ -267,7 +267,7 @@ def write_set(out: Path, subject: Subject, maps: Maps, progress: Progress) -> Sh
     """Write the maps of a texture set."""
     progress("files", 0, 1)
     files = write_textures(out, maps, subject.mesh.provenance.extra["source_format"] == "obj", subject.set)
-    facts = Facts.of(maps.material, subject.touched, islands(subject.mesh), subject.set.share)
+    facts = Facts.of(maps.material, subject.touched, islands(subject.mesh, subject.triangles), subject.set.share)
     normal = None if maps.normal is None else means(maps.normal, subject.block)
     return Shown(subject.set, files, means(maps.material, subject.block), normal, maps.occlusion is not None, facts)
 

@@ -54,16 +54,16 @@ def test_a_wide_gap_or_one_region_is_not_measured() -> None:
 
 def test_faces_that_share_uvs_are_one_island_and_cut_ones_are_not(tmp_path: Path) -> None:
     sheet, box = prepared(tmp_path / "a", grid(3)), prepared(tmp_path / "b", cube())
-    assert len(set(islands(sheet))) == 1
-    assert len(set(islands(box))) == 6
-    assert len(set(islands(box).reshape(6, 2)[:, 0])) == 6  # the two triangles of a face together
+    assert len(set(islands(sheet, np.ones(18, bool)))) == 1
+    assert len(set(islands(box, np.ones(12, bool)))) == 6
+    assert len(set(islands(box, np.ones(12, bool)).reshape(6, 2)[:, 0])) == 6  # the two triangles of a face together
 
 
 def test_gutter_of_a_cube(tmp_path: Path) -> None:
     """Charts keep 0.02 of a third of the square to their cell's border: 2 x 0.02 / 3 x 512 = 6.8 texels between them."""
     box = prepared(tmp_path, cube())
     touched = touched_texels(Layout.of(box["uv"], 512))
-    check = gutter(Facts.of(np.zeros((512, 512, 5), "f4"), touched, islands(box), 1.0).gap)
+    check = gutter(Facts.of(np.zeros((512, 512, 5), "f4"), touched, islands(box, np.ones(12, bool)), 1.0).gap)
     assert int(check.value.split()[0]) in (5, 6)
     assert check.state == "good"
 
