@@ -17,6 +17,7 @@ from stages.core.artifact import load_npz, read_exr, read_manifest
 from stages.core.errors import ArtifactError, DreammatError, InputError, OutputError
 from stages.core.images import read_image
 from stages.core.schemas import ASSET, PREP
+from stages.core.texture_sets import TextureSet
 from stages.edit.options import EditOptions
 from stages.edit.stage import edit, undo
 from stages.edit.texels import chosen_triangles, texels_of
@@ -96,6 +97,19 @@ def test_parts_are_called_by_the_grammar_of_parts(asset: Path, tmp_path: Path) -
     legs = read_manifest(asset, ASSET)[0].extra["coverage"] * 512**2 / 3
     assert made.clamped["roughness"] == pytest.approx(legs, rel=0.02)
     assert set(np.unique(metallic)) == set(np.unique(grey(asset, "metallic.exr"))) | {0}  # to the last texel of padding
+
+
+@pytest.mark.usefixtures("no_pictures")
+def test_a_part_of_one_texture_set_leaves_the_others_files_alone(tmp_path: Path) -> None:
+    sets = (TextureSet("_seat", None, ("seat",), 0.66), TextureSet("_leg", None, ("leg_1", "leg_2"), 0.33))
+    example = cube().with_(source_format="obj", parts=PARTS, part=[0, 0, 0, 0, 1, 2], set=[0, 0, 0, 0, 1, 1], sets=sets)
+    prep = save_prep(tmp_path / "prep.npz", example)
+    bake(prep, save_material(tmp_path / "material.npz", prep, constant(MATERIAL)), tmp_path / "asset", SMALL)
+    edit(tmp_path / "asset", tmp_path / "new", EditOptions(part=("leg_2",), metallic=0))
+    first, now = fingerprint(tmp_path / "asset"), fingerprint(tmp_path / "new")
+    pictures = {"metallic_leg.exr", "metallic_leg.png", "orm_leg.png", "base_metallic_leg.exr"}
+    assert {name for name, digest in now.items() if first.get(name) != digest} == pictures | {"model.glb", "bake.json"}
+    assert len(np.unique(grey(tmp_path / "new", "metallic_leg.exr"))) == 2
 
 
 def test_islands_that_share_texels_are_edited_by_whichever_is_called(tmp_path: Path) -> None:
