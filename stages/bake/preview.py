@@ -13,6 +13,7 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from stages.bake.raster import Layout, touched_texels
 from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
 from stages.core.artifact import Artifact
 from stages.core.color import srgb_encode
@@ -76,7 +77,7 @@ def contact_sheet(look: "Look", size: int, progress: Progress) -> NDArray[np.flo
     drawn = in_parallel(lambda c2w: draw_view(look, light, c2w, size), cameras(scene.vertices, scene.triangles))
     cells = [srgb_encode(picture.over(backdrop(size))) for picture in drawn]
     named = "albedo.png" if len(look.maps) == 1 else "albedo of each set"
-    cells += [*material_cells(drawn[0]), labelled(atlases(look.maps, size), named)]
+    cells += [*material_cells(drawn[0]), labelled(atlases(look, size), named)]
     progress("preview", 1, 1)
     return np.concatenate([np.concatenate(cells[k : k + COLUMNS], 1) for k in range(0, len(cells), COLUMNS)], 0)
 
@@ -218,16 +219,19 @@ def material_cells(picture: Picture) -> list[NDArray[np.float32]]:
     return cells
 
 
-def atlases(maps: list[NDArray[np.float32]], size: int) -> NDArray[np.float32]:
-    """The albedo textures beside each other in one cell, encoded. Returns: (size, size, 3)."""
-    across = math.ceil(math.sqrt(len(maps)))
+def atlases(look: Look, size: int) -> NDArray[np.float32]:
+    """The albedo textures beside each other in one cell, encoded, without what fills them beyond their charts. Returns:
+    (size, size, 3)."""
+    across = math.ceil(math.sqrt(len(look.maps)))
     edge = size // across
     sheet = np.empty((size, size, 3), np.float32)
     sheet[:] = MAP_BACKDROP
     inner = max(edge - (GAP if across > 1 else 0), 1)
-    for number, one in enumerate(maps if edge else []):
+    for number, one in enumerate(look.maps if edge else []):
+        layout = Layout.of(look.uv * np.float32((1, -1)) + np.float32((0, 1)), inner, mine=look.of_triangle == number)
+        shown = touched_texels(layout).triangle >= 0
         row, column = edge * (number // across), edge * (number % across)
-        sheet[row : row + inner, column : column + inner] = atlas(one, inner)
+        sheet[row : row + inner, column : column + inner][shown] = atlas(one, inner)[shown]
     return sheet
 
 
