@@ -1,9 +1,9 @@
 """Fewer charts: neighbours flattened as one sheet, as rigidly as they can be, where that stretches little and saves texture.
 
-Every chart costs a gutter, and every border between two a seam. Two charts become one if their union is a disk that can be laid
-flat with little stretch, does not cover itself, and fits into a smaller box, gutter included, than the two apart. Source of
-the flattening: Liu et al. 2008, "A Local/Global Approach to Mesh Parameterization" (as rigid as possible). Points of the
-plane are complex numbers: a turn is a factor.
+Every chart costs a gutter, and every border between two a seam. Two charts become one if their union is a disk, or has no
+more holes than the larger of them, and if it can be laid flat with little stretch, does not cover itself, and fits into a
+smaller box, gutter included, than the two apart. Source of the flattening: Liu et al. 2008, "A Local/Global Approach to Mesh
+Parameterization" (as rigid as possible). Points of the plane are complex numbers: a turn is a factor.
 """
 
 from collections.abc import Iterator
@@ -133,7 +133,7 @@ def laid_flat(corners: NDArray) -> NDArray[np.complex128]:
 
 
 def flatten(plane: NDArray, triangles: NDArray, flat: NDArray, second: NDArray[np.bool_]) -> NDArray[np.complex128] | None:
-    """Two charts as one, or None: no disk, or stretched too much.
+    """Two charts as one, or None: no disk, with more holes than the larger one had, or stretched too much.
 
     Args:
         plane: (R, 3) of `laid_flat`. triangles: (R, 3). flat: (R, 3) the charts as they are. second: (R,) whether a triangle is
@@ -141,11 +141,13 @@ def flatten(plane: NDArray, triangles: NDArray, flat: NDArray, second: NDArray[n
     Returns:
         (R, 3).
     """
-    count, pairs = len(triangles), edges(triangles).pairs
-    vertex = components(3 * count, corner_links(triangles, pairs)).reshape(-1, 3)
-    size = int(vertex.max()) + 1
-    if size - (3 * count - len(pairs)) + count != 1:  # Euler's characteristic
-        return None
+    pairs, vertex = _joined(triangles)
+    size, holes = int(vertex.max()) + 1, 1 - _characteristic(vertex, pairs)
+    if holes:
+        larger = triangles[second == (2 * second.sum() > len(second))]
+        pairs_of_larger, vertex_of_larger = _joined(larger)
+        if 1 - _characteristic(vertex_of_larger, pairs_of_larger) < holes:
+            return None
     edge = np.roll(plane, -1, 1) - plane  # from corner k to the next
     height = np.maximum(_cross(edge[:, 0], edge[:, 1]), _FLATTEST * (np.abs(edge) ** 2).max(1))
     weight = -_dot(np.roll(edge, -1, 1), np.roll(edge, -2, 1)) / height[:, None] / 2  # half a cotangent of the angle opposite
@@ -164,6 +166,17 @@ def flatten(plane: NDArray, triangles: NDArray, flat: NDArray, second: NDArray[n
         place = solved.solve(np.stack(force, 1)[1:])
         now = np.concatenate([[0], place[:, 0] + 1j * place[:, 1]])[vertex]
     return now if _little_stretched(plane, now) else None
+
+
+def _joined(triangles: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pairs of half-edges that meet, and the point of the sheet that each corner is, (R, 3)."""
+    pairs = edges(triangles).pairs
+    return pairs, components(3 * len(triangles), corner_links(triangles, pairs)).reshape(-1, 3)
+
+
+def _characteristic(vertex: NDArray, pairs: NDArray) -> int:
+    """Euler's: 1 for a disk, one less for each hole in it."""
+    return int(vertex.max()) + 1 - (vertex.size - len(pairs)) + len(vertex)
 
 
 def _complex(points: NDArray) -> NDArray[np.complex128]:

@@ -49,6 +49,18 @@ def test_a_tube_is_no_disk() -> None:
     assert joined.max() >= 1
 
 
+def test_lone_faces_go_back_into_a_chart_with_holes() -> None:
+    """Faces that were cut out here and there fill their holes again, though each union still has the other holes."""
+    vertices, triangles, strip = sheet(12, 12, 0.4, 1.2 * np.pi)
+    face = np.arange(len(triangles)) // 2
+    lone = (strip % 4 == 1) & (face % 12 % 4 == 2)
+    chart = np.where(lone, face + 1, 0)
+    assert len(np.unique(chart)) == 10
+    unrolled = merge(vertices, triangles, project(vertices, triangles, strip), strip, SIZE, PADDING)[0]
+    flat, joined = merge(vertices, triangles, unrolled, chart, SIZE, PADDING)
+    assert (joined == 0).all() and stretch(vertices[triangles], flat) == pytest.approx(1, abs=1e-3)
+
+
 def test_what_is_too_curved_stays_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two quarters of a ball make half a ball, which cannot be laid flat within 5 % of stretch."""
     n = 12
