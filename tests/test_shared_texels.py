@@ -7,6 +7,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
+from stages.asset.parts import labels
 from stages.bake.options import BakeOptions
 from stages.bake.stage import Subject, bake_maps
 from stages.bake.visibility import Views as Cameras
@@ -116,8 +117,13 @@ def test_places_that_share_a_texel_are_told_one_point(folder: Path) -> None:
     assert chart[0] < chart[[1, 2, 3]].min()
     first = mesh["vertices"][mesh["triangles"][:2]].reshape(-1, 3)
     own = mesh["vertices"][mesh["triangles"][8:10]].reshape(-1, 3)
+    label = labels(mesh)[::2]
+    assert len(set(label)) == 6
+    assert {pair[:2] for pair in views.shared_labels if pair[2] > 0.99} >= {(b, label[0]) for b in label[[1, 2, 3]]}
     for view in views.seen:
-        shown = views.surface(view, np.arange(len(views.pixels(view)))).shown.numpy()
+        surface = views.surface(view, np.arange(len(views.pixels(view))))
+        shown = surface.shown.numpy()
+        assert set(surface.label.tolist()) <= {label[0], label[4]}
         inside = [((shown > p.min(0) - 1e-4) & (shown < p.max(0) + 1e-4)).all(1) for p in (first, own)]
         assert (inside[0] | inside[1]).all()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from stages.asset.parts import NamedPart, find, named_parts
+from stages.asset.parts import LabelledPart, NamedPart, find, labelled_parts, labels, named_parts
 from stages.asset.parts_picture import BACKDROP, color, parts_picture
 from stages.core.artifact import load_npz
 from stages.core.errors import InputError
@@ -58,6 +58,16 @@ def test_objects_groups_slots_and_pieces_are_listed(parts: list[NamedPart]) -> N
     np.testing.assert_allclose(parts[0].size, 2, atol=1e-5)
     np.testing.assert_allclose([parts[0].place, parts[2].place], [(1, 5, 1), (3.5, 0.5, 0.5)], atol=1e-5)
     assert sorted(np.concatenate([part.triangles for part in parts[:3]])) == list(range(36))
+
+
+def test_every_part_is_made_of_whole_labels(chair: Path, parts: list[NamedPart]) -> None:
+    label, found = labels(load_npz(chair, PREP)), labelled_parts(load_npz(chair, PREP))
+    assert np.unique(label).tolist() == [0, 1, 2]
+    for part, other in zip(parts, found, strict=True):
+        assert (part.number, part.kind, part.call, part.share) == (other.number, other.kind, other.call, other.share)
+        assert np.array_equal(np.flatnonzero(np.isin(label, other.labels)), part.triangles)
+        assert LabelledPart.from_json(json.loads(json.dumps(other.to_json()))) == other
+    assert [len(part.labels) for part in find(found, "legs")] == [2]
 
 
 def test_parts_are_called_by_name_pattern_kind_and_number(parts: list[NamedPart]) -> None:
