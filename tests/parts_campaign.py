@@ -45,8 +45,9 @@ MODELS = {
 }
 """What each is made of: the whole, and its parts."""
 
-LIKE, ALSO = "granite", ("spot.obj", "bob_uv.obj")
-"""What is carried, and to which meshes besides."""
+LIKE = "granite"
+METRES = {"armchair.obj": 1.1, "vintage_fan.glb": 0.55, "babylon_shaderball.glb": 0.3, "spot.obj": 0.6, "bob_uv.obj": 0.4}
+"""What is carried from the first mesh to the others, and how large each is: their files' units are not one another's."""
 
 BOUNDS = {"color": 8.0, "roughness": 0.12, "metallic": 0.1, "border": 2.0, "time": 1.3, "like": 1.0}
 """CIEDE2000, roughness and metallic of a part against its words'; texels; CPU time against one prompt; CIEDE2000 of what is
@@ -55,8 +56,8 @@ carried against the first."""
 SIZE = 512
 
 ROUNDING = 0.1
-"""Of a material whose points were evaluated in other groups, which changes the last bits of a position: at the edge of a chip that
-makes up to 0.044, on 13 of 170,000 texels of the fan. Parts differ by far more."""
+"""Of a material whose points were evaluated in other groups, which changes the last bits of a position: at the edge of a chip
+that makes up to 0.044, on 13 of 170,000 texels of the fan. Parts differ by far more."""
 
 MEANINGS = {prompt.text: prompt.meaning for prompt in PROMPTS}
 
@@ -145,9 +146,10 @@ def carried(assets: Path, out: Path, views: int) -> dict[str, float]:
     """CIEDE2000 of the means of one material on each mesh against those on the first."""
     found: dict[str, NDArray] = {}
     first = out / Path(next(iter(MODELS))).stem / "like.npz"
-    for name in (*MODELS, *ALSO):
+    for name, metres in METRES.items():
         folder = ready(next(assets.rglob(name)), out / Path(name).stem, views)
         asked = DistillOptions(like=first) if found else DistillOptions(prompt=LIKE)
+        asked = replace(asked, object_size=metres)
         distill(folder / "conditions", folder / "like.npz", asked)
         ground = Ground.of(folder / "prep.npz", folder / "conditions", SIZE)
         found[name] = mean_of(ground.material(folder / "like.npz"))[:3]

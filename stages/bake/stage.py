@@ -83,14 +83,15 @@ class BakeResult:
 class Subject:
     """The mesh, ready to trace and to bake.
 
-    open: whether the backs of its triangles can be seen. set: the texture set that is baked, triangles: (F,) whether they show
-    it, layout: what lies on its texture, touched: (size, size) the surface point of each of its texels. block: texels along an
-    edge of the blocks whose means pictures show.
+    open: whether the backs of its triangles can be seen. label: (F,) of the parts. set: the texture set that is baked,
+    triangles: (F,) whether they show it, layout: what lies on its texture, touched: (size, size) the surface point of each of
+    its texels. block: texels along an edge of the blocks whose means pictures show.
     """
 
     mesh: Artifact
     scene: Scene
     open: bool
+    label: NDArray[np.int32]
     triangles: NDArray[np.bool_]
     layout: Layout
     touched: Surface
@@ -125,12 +126,12 @@ def subjects(prep: Path, mesh: Artifact, sets: list[TextureSet]) -> Iterator[Sub
         if not of_set:
             named = f" of set {chosen.name}" if chosen.name else ""
             raise ArtifactError(f"{prep}: its UVs cover no texel of {chosen.size}{named}; make it again with new UVs")
-    scene, open_mesh = traced_scene(mesh), is_open(mesh["triangles"])
+    scene, open_mesh, label = traced_scene(mesh), is_open(mesh["triangles"]), labels(mesh)
     for number, chosen in enumerate(sets):
         mine = of_triangle == number
         layout = Layout.of(mesh["uv"], chosen.size, mesh["charts"], mine)
         touched = touched_texels(layout)
-        yield Subject(mesh, scene, open_mesh, mine, layout, touched, chosen, block(sets))
+        yield Subject(mesh, scene, open_mesh, label, mine, layout, touched, chosen, block(sets))
 
 
 def bake(
@@ -217,8 +218,7 @@ def bake_maps(
     """The material of every texel of a set, to the last one."""
     on_chart = subject.touched.triangle >= 0
     mesh = subject.mesh
-    corners, label = mesh["vertices"][mesh["triangles"]], labels(mesh)
-    texels = Texels(learnt, corners, mesh["normals"], label, subject.layout, subject.touched)
+    texels = Texels(learnt, subject.corners, mesh["normals"], subject.label, subject.layout, subject.touched)
     residual = texels.residual()
     groups = patches(subject.touched, mesh["charts"])
     unseen = mend_unseen(subject, groups, views_of(made), learnt, residual, progress)

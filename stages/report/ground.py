@@ -11,7 +11,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from stages.asset.parts import labels
 from stages.bake.raster import Surface, covered_samples, joined
 from stages.bake.sizes import sized
 from stages.bake.stage import subjects
@@ -76,7 +75,7 @@ class Ground:
         some, width = joined(found)[chosen], np.concatenate(widths)[chosen]
         weights = np.c_[some.barycentric, 1 - some.barycentric.sum(1)].astype(np.float32)
         point, normal = some.interpolate(corners), some.interpolate(mesh["normals"])
-        return Ground(subject.scene, point, normal, width, labels(mesh)[some.triangle], some.triangle, weights)
+        return Ground(subject.scene, point, normal, width, subject.label[some.triangle], some.triangle, weights)
 
     def material(self, path: Path) -> NDArray[np.float32]:
         """A material as a bake evaluates it, (T, 5) linear. Raises: ArtifactError."""
