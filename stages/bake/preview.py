@@ -227,8 +227,9 @@ def atlases(look: Look, size: int) -> NDArray[np.float32]:
     sheet = np.empty((size, size, 3), np.float32)
     sheet[:] = MAP_BACKDROP
     inner = max(edge - (GAP if across > 1 else 0), 1)
+    up = look.uv * np.array([1, -1], np.float32) + np.array([0, 1], np.float32)
     for number, one in enumerate(look.maps if edge else []):
-        layout = Layout.of(look.uv * np.float32((1, -1)) + np.float32((0, 1)), inner, mine=look.of_triangle == number)
+        layout = Layout.of(up, inner, mine=look.of_triangle == number)
         shown = touched_texels(layout).triangle >= 0
         row, column = edge * (number // across), edge * (number % across)
         sheet[row : row + inner, column : column + inner][shown] = atlas(one, inner)[shown]

@@ -168,7 +168,7 @@ def flatten(plane: NDArray, triangles: NDArray, flat: NDArray, second: NDArray[n
     return now if _little_stretched(plane, now) else None
 
 
-def _joined(triangles: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _joined(triangles: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Pairs of half-edges that meet, and the point of the sheet that each corner is, (R, 3)."""
     pairs = edges(triangles).pairs
     return pairs, components(3 * len(triangles), corner_links(triangles, pairs)).reshape(-1, 3)
