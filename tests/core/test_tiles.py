@@ -83,3 +83,11 @@ def test_the_scale_is_that_of_the_texture_on_the_surface() -> None:
     found = Representatives(uv, np.array([0, 0, 1, 1], np.int32), np.zeros(len(uv), np.int32))
     face = np.array([2, 3, 0], np.int32)
     assert found.scale(area, face, found.of(face, np.full((3, 3), 1 / 3))[0]).tolist() == [2, 2, 1]
+
+
+def test_textures_share_no_texels() -> None:
+    """Two triangles of one place on textures of their own, and a third that lies on the second's."""
+    uv = np.repeat(np.array([[[0.1, 0.1], [0.9, 0.1], [0.1, 0.9]]]), 3, 0)
+    sets, middle = np.array([0, 1, 1], np.int32), np.full((3, 3), 1 / 3)
+    found, _ = Representatives(uv, np.arange(3, dtype=np.int32), sets).of(np.arange(3, dtype=np.int32), middle)
+    assert found.tolist() == [0, 1, 1]
