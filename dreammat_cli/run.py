@@ -10,6 +10,12 @@ from dreammat_cli.common import INPUT, Common, common_options
 
 STAGES = ("prep", "conditions", "distill", "bake")
 
+IN_METRES = ("glb", "fbx", "usd")
+"""Formats whose unit of length is the metre."""
+
+LARGEST = (0.005, 200.0)
+"""Metres between which an object of a scene is believed to be as large as its file says."""
+
 
 @click.command(
     epilog='Example: dreammat run chair.obj --prompt "a carved oak chair" -o chair --with conditions "--views 64"'
@@ -30,14 +36,15 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
     """
     prep, conditions, material = output / "prep.npz", output / "conditions", output / "material.npz"
     stages: tuple[str, ...] = STAGES
+    size: list[str] = []
     if mesh.suffix.lower() == ".npz":
-        prep, stages = mesh, STAGES[1:]
+        prep, stages, size = mesh, STAGES[1:], size_in_scene(mesh)
         if any(name == "prep" and text.strip() for name, text in further):
             raise click.UsageError(f"--with prep: {mesh} is prepared already; give its options to dreammat prep")
     arguments = {
         "prep": [mesh, "-o", prep],
         "conditions": [prep, "-o", conditions],
-        "distill": [conditions, "--prompt", prompt, "-o", material],
+        "distill": [conditions, "--prompt", prompt, "-o", material, *size],
         "bake": [prep, material, "-o", output / "asset"],
     }
     contexts: dict[str, click.Context] = {}
@@ -52,6 +59,23 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
             click.echo(f"[{number} of {len(stages)}] {stage}", err=True)
         with context:
             context.command.invoke(context)
+
+
+def size_in_scene(prep: Path) -> list[str]:
+    """How large an object of a scene is, as an option of distill, where its format has metres; nothing for any other mesh."""
+    if not prep.is_file():  # a later stage says so
+        return []
+    import numpy as np
+
+    from stages.core.artifact import load_npz
+    from stages.core.schemas import PREP
+
+    mesh = load_npz(prep, PREP)
+    said = mesh.provenance.extra
+    if "scene" not in said or said["source_format"] not in IN_METRES:
+        return []
+    metres = float(1 / np.cbrt(abs(np.linalg.det(mesh["to_world"][:3, :3]))))
+    return ["--object-size", f"{metres:.4g}"] if LARGEST[0] <= metres <= LARGEST[1] else []
 
 
 def expect_parts(prep: Path, asked: tuple[tuple[str, str], ...]) -> None:

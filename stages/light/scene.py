@@ -171,8 +171,11 @@ class Scene:
 
     def alone(self) -> "Scene":
         """The same mesh, and the same trees, without casters."""
+        if self._casters is None:
+            return self
         other = copy(self)
         other._any, other._casters = self._own, None
+        other._horizons = _Once(lambda: Horizons.over(*other._with_casters()))
         return other
 
     def shading_normal(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:

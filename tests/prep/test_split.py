@@ -141,6 +141,9 @@ def test_a_job_is_run_without_preparing_it_again(jobs: Path, tmp_path: Path) -> 
     said = CliRunner().invoke(cli, words, catch_exceptions=False).output
     assert "would prepare" not in said and "[1 of 3] conditions" in said
     prep = str(jobs / "jobs" / "stool" / "prep.npz")
+    words = ["run", prep, "--prompt", "oak", "-o", str(tmp_path), "--dry-run", "--json"]
+    plans = [json.loads(line) for line in CliRunner().invoke(cli, words, catch_exceptions=False).output.splitlines()]
+    assert [plan["object_size"] for plan in plans if "object_size" in plan] == [0.45]  # metres, as the scene has it
     words = ["run", prep, "--prompt", "oak", "-o", str(tmp_path), "--with", "distill", "--part wheel rubber"]
     result = CliRunner().invoke(cli, words)
     assert isinstance(result.exception, InputError) and "wheel" in str(result.exception)  # before anything long begins
