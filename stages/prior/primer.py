@@ -24,7 +24,7 @@ def primed(base: Coat, layers: list[Layer]) -> list[Layer]:
         chips = next((mask for mask in layer.masks if mask.kind in WORN), None)
         if chips:
             paint, ground = (layer.coat, base) if chips.invert else (base, layer.coat)
-            if paint.look in PAINTS and ground.look not in PAINTS:
+            if paint.look in PAINTS and ground.look not in (*PAINTS, "rust"):  # rust creeps under paint and primer alike
                 alike = tuple(replace(mask, draw=0) if mask is chips else mask for mask in layer.masks)
                 layer = replace(layer, masks=alike)
                 wider = tuple(_shared(mask) if mask.kind in WORN else mask for mask in alike)

@@ -209,15 +209,16 @@ def snow(at: Place) -> Look:
     drift = fbm(at, Spectrum(0.5, 0.02, 0.55, (1.5, 1, 1)), 1)
     crust = fbm(warped(at, 0.004, 0.03, 2), Spectrum(0.03, 0.001, 0.9, tails=0.3, skew=0.15, patch=0.4), 3)
     grain = fbm(at, Spectrum(0.006, 0.0003, 1.1, tails=0.4, skew=-0.15, patch=0.4), 4)
-    sunk = spots(warped(at, 0.006, 0.03, 5, 3), 0.07, (0.002, 0.016), 0.5, 6, (1.5, 1, 1))
+    sunk = spots(warped(at, 0.010, 0.05, 5, 3), 0.11, (0.004, 0.030), 0.6, 6, (1.5, 1, 1))
     deep = np.clip(sunk.inside / np.maximum(sunk.radius, 1e-4), 0, 1) * fading(0.02, at.footprint)
-    rim = np.exp(-np.square(sunk.inside / 0.0035)) * fading(0.006, at.footprint)
+    rim = np.exp(-np.square(sunk.inside / 0.005)) * fading(0.010, at.footprint)
     hollow = np.clip(-0.5 * drift - 0.25 * crust + 0.9 * deep, -1, 1.4)
     color = palette(0.58 - 0.30 * hollow + 0.05 * crust, "#b3c2d4", "#ced9e4", "#e3e8ec", "#f3f4f4")
-    color = shade(color, 0.035 * grain + 0.02 * crust - 0.05 * rim * np.clip(1 + grain, 0, 2))
+    lee = rim * np.clip(0.5 + sunk.cells.offset[1] / np.maximum(sunk.radius, 1e-3), 0, 1)  # the side that lies in shade
+    color = shade(color, 0.03 * grain + 0.015 * crust - 0.38 * lee * np.clip(1 + 0.6 * grain, 0, 2))
     twig = marks(at, 0.07, 0.0022, 2, 0.0, 2 * np.pi, 8, 0.85, 0.5)  # what the wind broke off
-    crumb = spots(warped(at, 0.002, 0.006, 9, 3), 0.05, (0.0006, 0.004), 0.3, 10).cover
-    fallen = np.clip(twig.cover * (twig.random(1) < 0.06) + 0.9 * crumb, 0, 1)
+    crumb = spots(warped(at, 0.002, 0.006, 9, 3), 0.045, (0.0006, 0.004), 0.45, 10).cover
+    fallen = np.clip(twig.cover * (twig.random(1) < 0.07) + 0.9 * crumb, 0, 1)
     color = mix(color, palette(0.5 + 0.2 * grain, "#3a2f26", "#5c4b3c", "#83705c"), 0.85 * fallen)
     rough = np.clip(0.72 + 0.06 * grain + 0.04 * crust, 0.1, 1)
     return Look(color, rough, 0.0, 0.014 * drift + 1.8e-4 * crust + 8e-5 * grain - 0.003 * deep + 4e-4 * fallen)

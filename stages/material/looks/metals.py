@@ -92,9 +92,9 @@ def polished(at: Place, kind: Metal) -> Look:
     wiped = fbm(warped(flat, 0.01, 0.06, 1), Spectrum(0.05, 0.0006, 0.8, (4, 1, 1), patch=0.5), 2)
     hair = marks(flat, 0.04, 0.00012, 4, 0.0, 6.2, 3, 0.8, 0.06).cover
     dust = spots(at, 0.006, (0.0001, 0.0005), 0.4, 4).cover
-    fine = fbm(at, Spectrum(0.002, 0.0003, 1.1, tails=0.4), 5)
+    fine = fbm(at, Spectrum(0.002, 0.0003, 1.1, tails=0.5, skew=-0.2, patch=0.7), 5)
     color = palette(0.6 + 0.1 * wiped + 0.15 * fine, *kind.colors)
-    color = shade(color, 0.015 * fine - 0.25 * dust - 0.03 * np.clip(wiped, 0, 3))
+    color = shade(color, 0.015 * fine - 0.35 * dust - 0.03 * np.clip(wiped, 0, 3) - 0.05 * hair)
     rough = 0.06 + 0.03 * np.clip(wiped, -1.2, 3) + 0.008 * fine + 0.12 * hair + 0.3 * dust
     return Look(color, np.clip(rough, 0.01, 1), 1.0 - 0.6 * dust, -1e-6 * hair + 1e-5 * dust)
 

@@ -75,22 +75,21 @@ def bone(at: Place) -> Look:
 
 
 def horn(at: Place) -> Look:
-    """Cow horn, scraped and polished: amber that one sees into, dark flames drawn out along it, fine layers, a pale cloud."""
+    """Cow horn, scraped and polished: honey that one sees into, long soft stripes along it, a dark cloud that thins out
+    through them, fine layers, scratches of the scraper."""
     flat = at.flat
-    bent = warped(flat, 0.004, 0.09, 1, 2)
-    flame = fbm(bent, Spectrum(0.06, 0.0012, 0.62, (1, 3.2, 1), 0.1, -0.1, 0.3), 2)
-    cloud = fbm(bent, Spectrum(0.10, 0.02, 0.6, (1, 1.6, 1)), 3)
-    layer = fbm(bent, Spectrum(0.012, 0.0006, 0.7, (1, 7, 1), 0.2, patch=0.5), 4)
-    fibre = fbm(flat, Spectrum(0.002, 0.00015, 1.1, (1, 6, 1), 0.4, -0.1, 0.4), 5)
-    ring = fbm(bent, Spectrum(0.03, 0.006, 0.6, (9, 1, 1), 0.2), 6)
-    scratch = marks(at, 0.03, 0.0002, 4, 1.5, 0.9, 7, 0.7, 0.1).cover
-    dark = np.clip(0.38 + 0.42 * flame + 0.24 * cloud, 0, 1)
-    depth = dark * dark * (3 - 2 * dark)
-    color = palette(0.5 + 0.22 * cloud - 0.12 * flame + 0.05 * layer + 0.03 * ring, "#9a6a30", "#c1935a", "#d8b987", "#e8d8b6")
-    color = mix(color, palette(0.45 + 0.1 * layer + 0.15 * cloud, "#17110d", "#2a1f18", "#4f3926"), depth)
-    color = tint(shade(color, 0.11 * fibre + 0.06 * layer + 0.03 * ring + 0.08 * scratch), 0.05 * cloud)
-    rough = 0.2 + 0.03 * fibre + 0.03 * layer + 0.16 * scratch
-    return Look(color, np.clip(rough, 0.05, 1), 0.0, 4e-5 * ring + 4e-6 * layer + 3e-6 * fibre - 4e-6 * scratch)
+    bent = warped(flat, 0.003, 0.09, 1, 2)
+    stripes = Spectrum(0.018, 0.0008, 0.62, (1, 16, 1), 0.1, patch=0.4)
+    stripe = fbm(bent, stripes, 2)
+    cloud = fbm(bent, Spectrum(0.14, 0.03, 0.5, (1, 2, 1)), 3)
+    fibre = fbm(flat, Spectrum(0.0016, 0.00015, 1.1, (1, 8, 1), 0.4, -0.1, 0.4), 4)
+    scratch = marks(at, 0.03, 0.0002, 4, 1.5, 0.9, 5, 0.7, 0.1).cover
+    dark = threshold(cloud + 0.45 * stripe, 0.5, 1.0)
+    color = palette(0.5 + 0.15 * stripe + 0.14 * cloud, "#8f6430", "#bb8f55", "#d6b988", "#eadbb9")
+    color = mix(color, palette(0.45 + 0.2 * stripe, "#1a1310", "#33251b", "#5a412a"), 0.94 * dark)
+    color = tint(shade(color, 0.08 * fibre + 0.05 * stripe + 0.08 * scratch), 0.05 * cloud)
+    rough = 0.18 + 0.03 * fibre + 0.02 * stripe + 0.16 * scratch
+    return Look(color, np.clip(rough, 0.05, 1), 0.0, 3e-6 * fibre + 6e-6 * stripe - 4e-6 * scratch)
 
 
 HAIRS = Spectrum(0.0014, 0.00012, 0.95, (1, 26, 1), 0.35, -0.1, 0.3)

@@ -49,10 +49,11 @@ def plastic(at: Place) -> Look:
     grain = cells(warped(at, 0.0002, 0.0012, 1), 0.0009, 2, 1.0)
     show = fading(0.0009, at.footprint)
     bump = (np.clip(grain.border / grain.size, 0, 0.4) - 0.15) * show
-    fine = fbm(at, Spectrum(0.0012, 0.0002, 1.1, tails=0.4, skew=0.2, patch=0.3), 3)
+    fine = fbm(at, Spectrum(0.0012, 0.0002, 1.1, tails=0.4, skew=0.2, patch=0.4), 3)
     scuffs, worn = _handled(at)
     color = palette(0.5 + 0.1 * fine + 0.15 * noise(at, 0.08, 4), "#c9c9c9", "#d8d8d8")
-    color = shade(color, 0.04 * fine + 0.25 * bump + 0.13 * scuffs - 0.03 * worn)
+    dirt = np.clip(0.35 * scuffs - 0.1 * worn * scuffs, 0, 1)  # what a scuff holds of what rubbed it
+    color = shade(color, 0.035 * fine + 0.2 * bump - dirt - 0.03 * worn)
     rough = 0.42 + 0.05 * fine - 0.35 * bump - 0.05 * np.clip(worn, -1, 2.5) + 0.12 * scuffs
     return Look(color, np.clip(rough, 0.05, 1), 0.0, 4e-5 * bump + 8e-6 * fine - 1e-5 * scuffs)
 

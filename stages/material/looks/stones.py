@@ -262,7 +262,7 @@ def terrazzo(at: Place) -> Look:
         piece = heap(at, size, CHIPS._replace(radius=radius), 4 + k, (1.2, 0.9, 1))
         own = each(
             piece.random(3), piece.shown,
-            "#8a7866", "#b39c84", "#c9b49a", "#e9e2d6", "#f1ece2", "#c3bdb3", "#a9a49c", "#b87f63", "#d8c7b0", "#6f6a64",
+            "#a08c76", "#bda78e", "#cdbaa2", "#e9e2d6", "#f1ece2", "#c8c2b8", "#b4afa7", "#c0937a", "#d8c7b0", "#88827a",
         )  # fmt: skip
         mottle = (0.08 * vein + 0.10 * np.exp(-np.square(vein / 0.12))) * (0.3 + 1.4 * piece.random(4))
         own = tint(shade(own, mottle + 0.06 * grain - 0.04), 0.1 * (piece.random(5) - 0.5) * piece.shown)
