@@ -15,7 +15,7 @@ from stages.core.polygons import triangulate
 from stages.light.scene import OFFSET, Scene
 from stages.prep.source import Source
 
-MOST = 200_000
+MOST = 100_000
 """Triangles of all casters together."""
 
 LEAST = 64
@@ -85,12 +85,10 @@ def casters(
         (CV, 3); (CF, 3); how many nodes were left out since they enclose it.
     """
     moved = [Placed(transform_points(to_world, of.vertices), of.triangles) for of in others]
-    chosen, left_out = moved, 0
-    if not _open(scene, _joined(chosen)):
-        low, high = scene.vertices.min(0), scene.vertices.max(0)
-        chosen = [of for of in moved if not ((of.box()[0] <= low).all() and (of.box()[1] >= high).all())]
-        left_out = len(moved) - len(chosen)
-    return *_joined(chosen), left_out
+    low, high = scene.vertices.min(0), scene.vertices.max(0)
+    apart = [of for of in moved if not ((of.box()[0] <= low).all() and (of.box()[1] >= high).all())]
+    chosen = moved if len(apart) == len(moved) or _open(scene, _joined(moved)) else apart
+    return *_joined(chosen), len(moved) - len(chosen)
 
 
 def _joined(parts: list[Placed]) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
