@@ -137,20 +137,30 @@ def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # 
     us, vs, share = np.empty(points, np.float32), np.empty(points, np.float32), np.empty(points, np.float32)
     cos, sin = np.empty(points, np.float32), np.empty(points, np.float32)
     found, towards, up = np.empty(points, np.int32), np.empty((3, points), np.float32), np.empty(points, np.float32)
+    who, squared = np.empty(points, np.int32), np.empty((3, points), np.float32)  # the points that draw, and where they do
     used = 0
     for s in range(len(slots)):
         lobe, i, count, place = slots[s]
         offset0, offset1 = hashed(2 * lobe, seed), hashed(2 * lobe + 1, seed)
         if lobe >= lobes:
+            some = 0
             for p in range(points):
-                k = max(cell[p, place], 0)
-                line = shift[pixel[p, 0], 1] + offset1 + (i + 1) * GOLDEN
-                us[p], vs[p], found[p], share[p] = _in_cell(k, within[p, place], line - math.floor(line), excess)
-                share[p] *= f32(count) * chosen[p, k] * f32(FINE * FINE / (4 * math.pi))
-            for p in range(points):
-                x, y, z = on_square(us[p], vs[p])
+                up[p] = f32(-1)
+                k = cell[p, place]
+                if k >= 0:
+                    line = shift[pixel[p, 0], 1] + offset1 + (i + 1) * GOLDEN
+                    us[some], vs[some], found[p], share[p] = _in_cell(k, within[p, place], line - math.floor(line), excess)
+                    share[p] *= f32(count) * chosen[p, k] * f32(FINE * FINE / (4 * math.pi))
+                    who[some] = p
+                    some += 1
+            for j in range(some):
+                x, y, z = on_square(us[j], vs[j])
+                squared[0, j], squared[1, j], squared[2, j] = x, y, z
+            for j in range(some):
+                p = who[j]
+                x, y, z = squared[0, j], squared[1, j], squared[2, j]
                 towards[0, p], towards[1, p], towards[2, p] = x, y, z
-                up[p] = x * n[p, 0] + y * n[p, 1] + z * n[p, 2] if cell[p, place] >= 0 else f32(-1)
+                up[p] = x * n[p, 0] + y * n[p, 1] + z * n[p, 2]
         else:
             for p in range(points):
                 c = pixel[p, 0]
