@@ -20,7 +20,6 @@ from stages.light import reconstruction
 from stages.light.blender import lifted
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer, surface_points
-from stages.light.horizon import Skyline
 from stages.light.light_set import MAX_LIGHTS, LightSet
 from stages.light.scene import Scene
 from stages.light.terms import BLENDER, Terms
@@ -77,11 +76,11 @@ def add_bounce(
 ) -> None:
     """Add the light that comes by way of the surface itself, in place."""
     mean, gap = np.zeros((2, *sums.mean.shape), np.float32)
-    rays, skyline = Rays.plan(quality, lights, seed, terms), scene.skyline(points.triangle, points.ng)
+    rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
     parts = [order[start : start + CHUNK] for start in range(0, len(order), CHUNK)]
     with ThreadPoolExecutor(cores()) as pool:
-        list(pool.map(lambda part: _chunk(scene, points, skyline, lights, terms, rays, pixel[part], part, mean, gap), parts))
+        list(pool.map(lambda part: _chunk(scene, points, lights, terms, rays, pixel[part], part, mean, gap), parts))
     sums.mean[:] += mean
     sums.variance[:] += reconstruction.variance(gap, near)
 
@@ -89,7 +88,6 @@ def add_bounce(
 def _chunk(
     scene: Scene,
     points: GBuffer,
-    skyline: Skyline,
     lights: LightSet,
     terms: Terms,
     rays: Rays,
@@ -102,7 +100,7 @@ def _chunk(
     n, wo = points.n[part], points.wo[part]
     frame, alphas = (n, *tangent_frame(n)), terms.alphas(part)
     unused = np.zeros((len(part), len(lights.cells.energy)), np.float32)
-    drawn = rays.draw(frame, wo, starts(points, skyline, part), pixel, alphas, lights, unused)
+    drawn = rays.draw(frame, wo, starts(points, part), pixel, alphas, lights, unused)
     hits = scene.intersect(drawn.origin, drawn.direction)
     if not hits.mask.any():
         return

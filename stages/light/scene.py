@@ -4,7 +4,6 @@ A miss is a mask, never a distance. Rays are float32; the mesh is the normalised
 in world units serves every source scale.
 """
 
-from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from threading import Lock
@@ -16,7 +15,6 @@ from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
 from stages.light.emission import Emission
-from stages.light.horizon import Horizons, Skyline
 from stages.light.normal_maps import NormalMaps
 
 OFFSET = 2e-5
@@ -59,19 +57,6 @@ class _Tree:
         return scene
 
 
-class _Once:
-    """Something made when first asked for; safe to ask from several threads."""
-
-    def __init__(self, make: Callable[[], Horizons]) -> None:
-        self._make, self._lock = make, Lock()
-        self._made: Horizons | None = None
-
-    def get(self) -> Horizons:
-        with self._lock:
-            self._made = self._made or self._make()
-            return self._made
-
-
 class Scene:
     """A triangle mesh ready for ray queries; safe to use from several threads, which run in parallel.
 
@@ -101,19 +86,9 @@ class Scene:
         self._closest, self._own = (_Tree(self.vertices, self.triangles, robust) for robust in (True, False))
         self._any = self._own
         if self._casters is not None:
-            self._any = _Tree(*self._with_casters()[:2], robust=False)
-        self._horizons = _Once(lambda: Horizons.over(*self._with_casters()))
-
-    def _with_casters(self) -> tuple[NDArray, NDArray, NDArray]:
-        """Vertices, triangles and normals of all that may stand in the way of a ray, the mesh first."""
-        if self._casters is None:
-            return self.vertices, self.triangles, self.normals
-        vertices, triangles = self._casters
-        return (
-            np.concatenate([self.vertices, vertices]).astype(np.float32),
-            np.concatenate([self.triangles, triangles + len(self.vertices)]).astype(np.int32),
-            np.concatenate([self.normals, np.zeros((len(triangles), 3, 3), np.float32)]),
-        )
+            vertices = np.concatenate([self.vertices, self._casters[0]]).astype(np.float32)
+            triangles = np.concatenate([self.triangles, self._casters[1] + len(self.vertices)]).astype(np.int32)
+            self._any = _Tree(vertices, triangles, robust=False)
 
     def intersect(self, origins: NDArray, directions: NDArray) -> Hits:
         """Closest hit of each ray. Args: (R, 3) each; directions need not be unit: t is in their length."""
@@ -130,10 +105,6 @@ class Scene:
     def hidden(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
         """Whether the mesh itself lies along each ray, at any distance. Args: (R, 3) each."""
         return self._own.run(origins, directions, query="OCCLUDED") >= 0
-
-    def skyline(self, triangle: NDArray, ng: NDArray) -> Skyline:
-        """What may stand above points of some triangles, found once for all views. Args: (P,); (P, 3), towards their side."""
-        return self._horizons.get().above(triangle, ng)
 
     def shaded_smooth(self) -> "Scene":
         """The same mesh with normals that are smooth over every edge: at a vertex, its faces' by the angle they have there.

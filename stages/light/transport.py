@@ -43,7 +43,6 @@ from stages.core.shading import KNOTS, Transport
 from stages.light import highlights, reconstruction
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
-from stages.light.horizon import Skyline
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
 from stages.light.terms import GLTF, Terms
@@ -236,10 +235,9 @@ def trace(
     mean, gap = np.empty((2, len(points.n), terms.stored, CHANNELS), np.float32)
     rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
-    sky = scene.skyline(points.triangle, points.ng)
     with ThreadPoolExecutor(cores()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
-        list(pool.map(lambda part: _tile(scene, points, sky, lights, terms, rays, pixel[part], part, wanted, mean, gap), parts))
+        list(pool.map(lambda part: _tile(scene, points, lights, terms, rays, pixel[part], part, wanted, mean, gap), parts))
     if not wanted.all():
         gap[..., : 3 * count[1]] *= wanted.repeat(3, 1)[:, None]  # nor is its noise any to judge others by
     variance = reconstruction.variance(gap, reconstruction.Neighbours.of(points))
@@ -249,7 +247,6 @@ def trace(
 def _tile(
     scene: Scene,
     points: GBuffer,
-    skyline: Skyline,
     lights: LightSet,
     terms: Terms,
     rays: "Rays",
@@ -264,8 +261,8 @@ def _tile(
     frame, alphas = (n, *tangent_frame(n)), terms.alphas(part)
     chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
     aim(n, wo, wanted[part], AIM, (cells.direction, cells.radius, cells.energy, cells.first), chosen, aimed)
-    drawn = rays.draw(frame, wo, starts(points, skyline, part), pixel, alphas, lights, chosen)
-    occluded = drawn.occluded(scene)
+    drawn = rays.draw(frame, wo, starts(points, part), pixel, alphas, lights, chosen)
+    occluded = scene.occluded(drawn.origin, drawn.direction)
     excess = (lights.fine, lights.block, lights.texels.radiance, rays.density, cells.number, aimed)
     seen = (lights.pyramid, lights.level_start, *excess)
     sampled = (rays.counts, rays.bounds, rays.slots, terms.principled)
@@ -278,9 +275,9 @@ def _tile(
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
 
 
-def starts(points: GBuffer, skyline: Skyline, part: NDArray) -> "Starts":
-    """Where rays of some points leave."""
-    return Starts(points.origin[part], points.surface(part), points.ng[part], skyline.of(part))
+def starts(points: GBuffer, part: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    """Where rays of some points leave the smooth surface, and the triangle, and its normal."""
+    return points.origin[part], points.surface(part), points.ng[part]
 
 
 def tiles(mask: NDArray[np.bool_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -341,30 +338,30 @@ class Rays:
         self,
         frame: tuple[NDArray, NDArray, NDArray],
         wo: NDArray,
-        start: "Starts",
+        start: tuple[NDArray, NDArray, NDArray],
         pixel: NDArray,
         alphas: NDArray,
         lights: LightSet,
         chosen: NDArray,
     ) -> "Drawn":
-        """The rays of a tile's points, R in all. Args: start: of these points."""
+        """The rays of a tile's points, R in all. Args: start: of `starts`."""
         count, slots = len(wo), len(self.slots)
         most = count * slots
         origins, directions = np.empty((2, most, 3), np.float32)
         texel, density = np.empty(most, np.int32), np.empty(most, np.float32)
-        rays = Drawn(origins, directions, texel, density, np.empty((count, slots), np.int32), np.empty(most, np.bool_))
+        rays = Drawn(origins, directions, texel, density, np.empty((count, slots), np.int32))
         excess = (lights.texels, lights.cells.begin, lights.cells.first)
         samples = (self.slots, self.shift, self.turn, self.jitter, self.seed)
-        used = draw(*frame, wo, start.smooth, pixel, samples, alphas, excess, chosen, rays)
-        settle(rays, start, start.skyline)
-        return Drawn(origins[:used], directions[:used], texel[:used], density[:used], rays.row, rays.open[:used])
+        used = draw(*frame, wo, start[0], pixel, samples, alphas, excess, chosen, rays)
+        settle(origins, directions, rays.row, *start[1:])
+        return Drawn(origins[:used], directions[:used], texel[:used], density[:used], rays.row)
 
 
 class Drawn(NamedTuple):
     """Rays of a tile's points. origin, direction: (R, 3). row: (P, S), a sample's ray, or -1 where it is under the horizon.
 
     texel, density: (R,), of light rays: their texel among those of the `LightSet`, and how many light rays per steradian there
-    are. open: (R,), whether nothing can stand in a ray's way.
+    are.
     """
 
     origin: NDArray[np.float32]
@@ -372,23 +369,6 @@ class Drawn(NamedTuple):
     texel: NDArray[np.int32]
     density: NDArray[np.float32]
     row: NDArray[np.int32]
-    open: NDArray[np.bool_]
-
-    def occluded(self, scene: Scene) -> NDArray[np.bool_]:
-        """Whether something stands in each ray's way, (R,); only those that may be are traced."""
-        result = np.zeros(len(self.open), np.bool_)
-        unsure = np.flatnonzero(~self.open)
-        result[unsure] = scene.occluded(self.origin[unsure], self.direction[unsure])
-        return result
-
-
-class Starts(NamedTuple):
-    """Where rays of some points leave. smooth, surface: (P, 3), the smooth surface and the triangle. ng: (P, 3), its normal."""
-
-    smooth: NDArray[np.float32]
-    surface: NDArray[np.float32]
-    ng: NDArray[np.float32]
-    skyline: Skyline
 
 
 def share_out(light: int, lights: LightSet) -> NDArray[np.int64]:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from stages.core.albedo import MIN_COSINE
 from stages.light.blender import F0, burley, fresnel
 from stages.light.environment import bilinear
-from stages.light.horizon import sector
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
 
 CLASSES = 64
@@ -111,13 +110,13 @@ def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # 
     Args:
         n, t, b, wo, origin: (P, 3) world. pixel: (P, 2), its class and its number in the image.
         samples: slots, shift, turn, jitter and seed of `Rays`. alphas: (P, K) of the lobes after the cosine.
-        excess: texels of a `LightSet`, begin and first of its cells. chosen: of `aim`. rays: a `Drawn`, written but for `open`.
+        excess: texels of a `LightSet`, begin and first of its cells. chosen: of `aim`. rays: arrays of a `Drawn`, written.
     Returns:
         Rays written.
     """
     f32 = np.float32
     slots, shift, turn, spread, seed = samples
-    origins, directions, texel, density, row = rays.origin, rays.direction, rays.texel, rays.density, rays.row
+    origins, directions, texel, density, row = rays
     points, knots = len(n), alphas.shape[1]
     lobes = knots + 1
     view = np.empty((lobes, 3, points), np.float32)  # stretched by each alpha, see core.brdf.sample_vndf
@@ -214,30 +213,21 @@ def _towards(view, lobe, base, sample, cos, sin, alphas, towards, up):  # type: 
 
 
 @fast
-def settle(rays, start, skyline):  # type: ignore[no-untyped-def]
-    """Move the starts of rays from the smooth surface to the triangle, by their angle to it, in place, and tell which are open.
+def settle(origin, direction, row, surface, ng):  # type: ignore[no-untyped-def]
+    """Move the starts of rays from the smooth surface to the triangle, by their angle to it, in place.
 
-    Args: rays: a `Drawn`, of which origin and open are written. start: a `Starts`. skyline: of `stages.light.horizon`, (P,).
+    Args:
+        origin, direction: (R, 3). row: (P, S) of a `Drawn`. surface, ng: (P, 3), where rays leave the triangle, and its normal.
     """
-    f32 = np.float32
-    origin, direction, row, clear = rays.origin, rays.direction, rays.row, rays.open
-    surface, ng = start.surface, start.ng
     for p in range(len(row)):
-        patch = skyline.row[p]
-        frame = skyline.frame[max(patch, 0)]
         for s in range(row.shape[1]):
             r = row[p, s]
             if r < 0:
                 continue
-            dx, dy, dz = direction[r, 0], direction[r, 1], direction[r, 2]
-            cosine = dx * ng[p, 0] + dy * ng[p, 1] + dz * ng[p, 2]
-            lifted = f32(1) - min(max(cosine * f32(1 / GRAZING), f32(0)), f32(1))
+            cosine = direction[r, 0] * ng[p, 0] + direction[r, 1] * ng[p, 1] + direction[r, 2] * ng[p, 2]
+            lifted = np.float32(1) - min(max(cosine * np.float32(1 / GRAZING), np.float32(0)), np.float32(1))
             for d in range(3):
                 origin[r, d] = surface[p, d] + lifted * (origin[r, d] - surface[p, d])
-            up = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-            x = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-            y = dx * frame[2, 0] + dy * frame[2, 1] + dz * frame[2, 2]
-            clear[r] = patch >= 0 and up * f32(255) > f32(skyline.sine[max(patch, 0), sector(x, y)])
 
 
 @fast
@@ -425,7 +415,7 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, albedo, seen, where
     """
     f32 = np.float32
     counts, bounds, slots, principled = sampled
-    directions, drawn, drawn_density, row = rays.direction, rays.texel, rays.density, rays.row
+    _, directions, drawn, drawn_density, row = rays
     texels, level_start, fine, block, peak, light_density, cells, aimed = seen
     lights = len(cells)
     points, most = row.shape
@@ -521,7 +511,7 @@ def mirror(radiance, rays, occluded, weights, where, first, out):  # type: ignor
         radiance: (H, W, 3). rays: of `draw`, occluded: of the scene. weights: (2, P), of what is shown in two sums.
         where: each point's row of `out` and the places of those sums in it. first: channel of the environment.
     """
-    directions, row = rays.direction, rays.row
+    _, directions, _, _, row = rays
     seen = np.empty(3, np.float64)
     for p in range(len(row)):
         r = row[p, row.shape[1] - 1]
@@ -543,7 +533,7 @@ def accumulate_bounce(  # type: ignore[no-untyped-def]
         shown: (H, sums, CHANNELS), what such a point sends back to it, for each sum.
     """
     counts, bounds, _, principled = sampled
-    directions, row = rays.direction, rays.row
+    _, directions, _, _, row = rays
     points, slots = row.shape
     terms = albedo.shape[1]
     dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
