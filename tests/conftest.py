@@ -74,3 +74,8 @@ def assets() -> Path:
     if not folder.is_dir():
         pytest.skip("the optional assets are not beside the project")
     return folder
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The long files first, those that run whole stages, so that no worker is left with one at the end."""
+    items.sort(key=lambda item: item.path.parent != ROOT / "tests")

@@ -146,7 +146,6 @@ class Scene:
             return self
         other = copy(self)
         other._any, other._casters = self._own, None
-        other._horizons = _Once(lambda: Horizons.over(*other._with_casters()))
         return other
 
     def shading_normal(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
