@@ -41,6 +41,15 @@ def stretch_end(x, y, z, start):  # type: ignore[no-untyped-def]
     return end
 
 
+@inline
+def next_part(x, y, z, start):  # type: ignore[no-untyped-def]
+    """Where the points from `start` on that go together end, and whether they are a run in one cell."""
+    end = run_end(x, y, z, start)
+    if end - start >= RUN:
+        return end, True
+    return stretch_end(x, y, z, start), False
+
+
 @fast
 def worley(x, y, z, period, jitter, seed, near, second, border, ident, to_centre):  # type: ignore[no-untyped-def]
     """The two nearest of randomly placed points, one in each unit cube, of those in the 27 cubes around. Source: Worley 1996.
@@ -49,10 +58,7 @@ def worley(x, y, z, period, jitter, seed, near, second, border, ident, to_centre
     the two. ident: (P,) uint32 hash of the nearest. to_centre: (3, P) from the nearest point to here. """
     start = 0
     while start < len(x):
-        end = run_end(x, y, z, start)
-        alike = end - start >= RUN
-        if not alike:
-            end = stretch_end(x, y, z, start)
+        end, alike = next_part(x, y, z, start)
         part = slice(start, end)
         px, py, pz, found = x[part], y[part], z[part], to_centre[:, part]
         if alike:
@@ -182,10 +188,7 @@ def strokes(x, y, face, period, shape, seed, distance, along, ident):  # type: i
     distance[:], along[:], ident[:] = np.float32(9), np.float32(0), np.uint32(0)
     start = 0
     while start < len(x):
-        end = run_end(x, y, face, start)
-        alike = end - start >= RUN
-        if not alike:
-            end = stretch_end(x, y, face, start)
+        end, alike = next_part(x, y, face, start)
         part = slice(start, end)
         if alike:
             _strokes_run(x[part], y[part], face[part], period, shape, seed, distance[part], along[part], ident[part])
