@@ -23,9 +23,9 @@ OUTSIDE = 1e-3
 """A colour counts as outside Rec. 709 when its least component is below minus this share of its largest."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Environment:
-    """A distant light. radiance: (H, 2 H, 3) float32, finite, not negative. name: its file's stem."""
+    """A distant light, equal to itself alone. radiance: (H, 2 H, 3) float32, finite, not negative. name: its file's stem."""
 
     name: str
     radiance: NDArray[np.float32]

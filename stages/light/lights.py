@@ -4,6 +4,7 @@ Each is a function of nothing: latitude-longitude, z up, the object's front on +
 that a white diffuse surface facing the main light comes out near 0.5-1 in the day lights.
 """
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -58,6 +59,7 @@ def _texels() -> NDArray[np.float64]:
     return directions_of_texels(HEIGHT, 2 * HEIGHT)[0]
 
 
+@functools.cache
 def clear_sky() -> Environment:
     """Blue sky, brown ground, and a sun of 1.2 degrees at 42 degrees of elevation."""
     w = _texels()
@@ -67,6 +69,7 @@ def clear_sky() -> Environment:
     return _make("clear_sky", light + glow + disc(w, sun, 0.9, 0.6)[..., None] * np.array([2500.0, 2250.0, 1900.0]))
 
 
+@functools.cache
 def overcast() -> Environment:
     """A white sky three times as bright at the zenith as at the horizon (CIE overcast), dim grey ground."""
     w = _texels()
@@ -77,6 +80,7 @@ def overcast() -> Environment:
     return _make("overcast", ground * (1 - blend) + sky * blend)
 
 
+@functools.cache
 def studio() -> Environment:
     """A dark room with a large key, a cool fill, a warm rim strip and a top light."""
     w = _texels()
@@ -91,6 +95,7 @@ def studio() -> Environment:
     return _make("studio", light)
 
 
+@functools.cache
 def interior() -> Environment:
     """A room with warm walls, a white ceiling, a wooden floor, two windows and a lamp."""
     w = _texels()
@@ -103,6 +108,7 @@ def interior() -> Environment:
     return _make("interior", light + lamp)
 
 
+@functools.cache
 def night() -> Environment:
     """A dark blue sky with a small moon, and sodium lamps and lit windows along the horizon."""
     w = _texels()
@@ -118,6 +124,7 @@ def night() -> Environment:
     return _make("night", light)
 
 
+@functools.cache
 def preview_light() -> Environment:
     """A bright late-afternoon terrace: low warm sun, pale sky, a reflecting floor. No conditions are made with it."""
     w = _texels()

@@ -27,6 +27,7 @@ Source: Veach 1997, ch. 9 (MIS); Křivánek & Colbert 2008, "Real-time Shading w
 Heidrich 2001, "Interleaved Sampling".
 """
 
+import functools
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -134,20 +135,14 @@ def light_transport(
     return result
 
 
-KEPT = 5
-"""Light sets that are kept: as many as one asset's preview and report are lit by."""
-
-_light_sets: dict[tuple[int, ...], LightSet] = {}
+KEPT = 8
+"""Light sets that are kept: one asset's conditions, preview and report are lit by as many or fewer."""
 
 
+@functools.lru_cache(KEPT)
 def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
-    """The light set of these very objects, kept for the next view (the last KEPT sets are)."""
-    key = tuple(id(e) for e in environments)
-    if key not in _light_sets or _light_sets[key].environments != environments:
-        while len(_light_sets) >= KEPT:
-            _light_sets.pop(next(iter(_light_sets)))
-        _light_sets[key] = light_set(list(environments))
-    return _light_sets[key]
+    """The light set of these very objects, kept for the next view or asset."""
+    return light_set(list(environments))
 
 
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
