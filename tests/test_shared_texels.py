@@ -37,13 +37,19 @@ def panel(corner: NDArray, u: NDArray, v: NDArray) -> NDArray:
     return np.array([corner, corner + u, corner + u + v, corner + v])
 
 
+FIELD = np.array([(0.1, 0.1), (0.4, 0.1), (0.4, 0.8), (0.1, 0.8)])
+MIRRORED = FIELD[[1, 0, 3, 2]]
+
+
 def written(path: Path) -> Path:
-    """Six boards round a square post, at different heights: one by itself, one stacked on it, one mirrored, one a tile away,
-    one half over the border of the tile, one of no area in UV. Their texels lie in two fields."""
-    field = np.array([(0.1, 0.1), (0.4, 0.1), (0.4, 0.8), (0.1, 0.8)])
+    """One board by itself, one stacked on it, one mirrored, one a tile away, one half over the border of the tile, one of no
+    area in UV. Their texels lie in two fields."""
     other = np.array([(0.65, 0), (0.9, 0), (0.9, 0.7), (0.65, 0.7)])
-    mirrored = field[[1, 0, 3, 2]]
-    uvs = [field, field, mirrored, field + (3, -1), other - (0.85, 0), np.tile(field[:1], (4, 1))]
+    return boards(path, [FIELD, FIELD, MIRRORED, FIELD + (3, -1), other - (0.85, 0), np.tile(FIELD[:1], (4, 1))])
+
+
+def boards(path: Path, uvs: list[NDArray]) -> Path:
+    """Up to six boards round a square post, at different heights; the sixth is thin. Args: uvs: (4, 2) of each."""
     lines, faces = [], []
     for k, uv in enumerate(uvs):
         angle = k * np.pi / 3
@@ -141,3 +147,22 @@ def test_a_texel_is_seen_where_any_of_its_places_is(folder: Path) -> None:
     of_first = mesh["charts"][firsts.triangle] == mesh["charts"][0]
     assert not seen_points(subject.scene, firsts, cameras, False)[of_first].any()
     assert seen_elsewhere(subject.scene, subject.layout, mesh["charts"], groups, cameras, False)[of_first].mean() > 0.95
+
+
+@pytest.mark.parametrize("stacked", [FIELD, MIRRORED], ids=["stacked", "mirrored"])
+def test_what_is_stacked_shows_what_it_would_alone(stacked: NDArray, tmp_path: Path) -> None:
+    """The texels of the board that represents the others are as crisp as if the others had texels of their own."""
+    layouts = {"alone": [FIELD, FIELD + (0.45, 0)], "shared": [FIELD, stacked]}
+    stone, shown = Recipe(Coat("granite", metres=1.0)), []
+    for name, uvs in layouts.items():
+        path = tmp_path / f"{name}.npz"
+        prep(boards(tmp_path / f"{name}.obj", uvs), path, PrepOptions())
+        mesh = load_npz(path, PREP)
+        subject = Subject.of(path, mesh, SIZE)
+        made = save_material(tmp_path / "material.npz", path, small_residual(variation=1.0), recipe=stone)
+        learnt = LearntMaterial.of(made, load_npz(made, MATERIAL))
+        maps, _ = bake_maps(subject, load_npz(made, MATERIAL), learnt, BakeOptions(size=SIZE, occlusion_rays=1), silent)
+        first = np.isin(subject.touched.triangle, [0, 1])  # of the first board, which lies in the same field in both
+        shown.append(maps.material[first])
+    assert np.sqrt(np.square(shown[0] - shown[1]).mean()) < 0.01
+    assert shown[0][:, :3].std() > 0.05  # there is a pattern to blur

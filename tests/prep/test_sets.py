@@ -178,19 +178,25 @@ def corner_uvs(made: Artifact) -> NDArray[np.float32]:
     return np.unique(rows, axis=0)
 
 
-@pytest.mark.parametrize("soups", [[of_tiles()], [stacked_a_tile_away()]], ids=["tiles", "stacked"])
-def test_uvs_are_the_sources_bit_for_bit_in_obj(soups: list[Soup], tmp_path: Path) -> None:
-    made = prepared(tmp_path, soups)
+KEPT: dict[str, tuple[list[Soup], list[str] | None]] = {
+    "tiles": ([of_tiles()], None),
+    "stacked": ([stacked_a_tile_away()], None),
+    "slots": (fields(parts(2), (0.04, 0.04), (0.04, 0.04)), TWO),
+}
+
+
+@pytest.mark.parametrize(("soups", "slots"), KEPT.values(), ids=KEPT)
+def test_uvs_are_the_sources_bit_for_bit_in_obj(soups: list[Soup], slots: list[str] | None, tmp_path: Path) -> None:
+    made = prepared(tmp_path, soups, slots)
     write_model(tmp_path / "model.obj", made)
     source, model = read_obj(tmp_path / "a.obj"), read_obj(tmp_path / "model.obj")
     np.testing.assert_array_equal(model.uv[model.loop_uv], source.uv[source.loop_uv])
     np.testing.assert_array_equal(model.loop_vertex, source.loop_vertex)
-    slots = [model.parts[part].material for part in model.face_part]
-    tiles = [one.suffix for one in texture_sets(made.provenance)]
-    expected = [f"material{tiles[k]}" if len(tiles) > 1 else "material" for k in made["face_set"].tolist()]
-    assert slots == expected
+    found = [one.suffix for one in texture_sets(made.provenance)]
+    worn = [suffix[1:] if slots else f"material{suffix}" for suffix in found]
+    assert [model.parts[part].material for part in model.face_part] == [worn[k] for k in made["face_set"].tolist()]
     told = (tmp_path / "model.mtl").read_text()
-    assert all(f"map_Kd albedo{suffix}.png" in told for suffix in tiles)
+    assert all(f"map_Kd albedo{suffix}.png" in told for suffix in found)
 
 
 def test_uvs_are_the_sources_bit_for_bit_in_glb(tmp_path: Path) -> None:
@@ -213,6 +219,34 @@ def test_uvs_are_the_sources_bit_for_bit_in_glb(tmp_path: Path) -> None:
     assert all(part.uv is model.parts[0].uv and np.array_equal(part.uv, uv) for part in model.parts)
     assert all(np.array_equal(part.positions, positions) for part in model.parts)
     np.testing.assert_array_equal(np.concatenate([part.triangles for part in model.parts]).ravel(), triangles)
+
+
+def test_uvs_of_slots_are_the_sources_bit_for_bit_in_glb(tmp_path: Path) -> None:
+    """Two primitives that each fill the square: a set for each, every vertex and face as it was."""
+    built, given = GltfBuilder(), []
+    built.root["materials"] = [{"name": name} for name in TWO]
+    for points, uv in parts(2):
+        table = [values.reshape(-1, values.shape[-1]).astype(np.float32) for values in (points, uv * 0.92 + 0.04)]
+        triangles = np.arange(len(table[0]), dtype=np.uint32).reshape(-1, 4)[:, [0, 1, 2, 0, 2, 3]].reshape(-1)
+        given.append((*table, triangles))
+    primitives = [
+        {
+            "attributes": {"POSITION": built.accessor(points, "VEC3"), "TEXCOORD_0": built.accessor(uv, "VEC2")},
+            "indices": built.accessor(triangles, "SCALAR"),
+            "material": number,
+        }
+        for number, (points, uv, triangles) in enumerate(given)
+    ]
+    built.mesh(primitives, name="helmet")
+    prep(built.write(tmp_path / "a.glb"), tmp_path / "a.npz", SMALL)
+    made = load_npz(tmp_path / "a.npz", PREP)
+    assert names(made) == ["_shell", "_visor"]
+    model = source_model(made, double_sided=False)
+    assert [(part.worn.name, part.worn.set) for part in model.parts] == [("shell", 0), ("visor", 1)]
+    for part, (points, uv, triangles) in zip(model.parts, given, strict=True):
+        corner = part.triangles.ravel()
+        np.testing.assert_array_equal(part.uv[corner], uv[triangles])
+        np.testing.assert_array_equal(part.positions[corner], points[triangles])
 
 
 def test_many_slots(tmp_path: Path) -> None:
