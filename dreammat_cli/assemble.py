@@ -5,10 +5,14 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, examples, reporter, show
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat assemble room/table/asset room/chair_1/asset -o room/scene.glb",
+    )
+)
 @click.argument("assets", type=INPUT, nargs=-1, required=True, metavar="ASSET...")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="SCENE.glb", help="The scene to write.")
 @common_options

@@ -4,13 +4,29 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, library_option, lines_of, plan, reporter, show
+from dreammat_cli.common import (
+    INPUT,
+    Common,
+    common_options,
+    defaults,
+    examples,
+    library_option,
+    lines_of,
+    plan,
+    reporter,
+    show,
+)
 from stages.bake.options import SIZES, BakeOptions
 
 DEFAULT = defaults(BakeOptions)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat bake chair/prep.npz chair/material.npz -o chair/asset",
+        "dreammat bake chair/prep.npz chair/material.npz -o chair/asset --size 4096 --relief 0.5",
+    )
+)
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.argument("material", type=INPUT, metavar="MATERIAL.npz")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="The asset folder to write.")

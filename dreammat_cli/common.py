@@ -19,6 +19,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, ProgressColumn, Task, T
 from rich.progress import Progress as Bar
 from rich.text import Text
 
+from dreammat_cli.whole import Whole, told
+from stages.core.naming import guess
 from stages.core.progress import Progress, silent
 
 LINE_EVERY = 15.0
@@ -26,6 +28,16 @@ LINE_EVERY = 15.0
 
 INPUT = click.Path(path_type=Path)
 """A path to read; whether it can be read is the stage's to say, in its own words."""
+
+
+class Guessing(click.Group):
+    """A group that says which command was probably meant by one that is not there."""
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        known = self.list_commands(context)
+        if name not in known and not context.resilient_parsing:
+            raise click.UsageError(f"No such command {name!r}; {guess(name, known)}expected {', '.join(known)}", context)
+        return self.commands.get(name)
 
 
 library_option = click.option(
@@ -70,6 +82,11 @@ def common_options(function: Callable) -> Callable:
     return call
 
 
+def examples(*lines: str) -> str:
+    """What --help ends with: calls as they are typed, each on a line of its own."""
+    return "\n".join(["\b", "Examples:", *(f"  {line}" for line in lines)])
+
+
 def defaults(options: type) -> dict[str, Any]:
     """The defaults of an options dataclass, so that the command line has none of its own."""
     return {field.name: field.default for field in dataclasses.fields(options)}
@@ -102,10 +119,19 @@ class Rate(ProgressColumn):
     """Units a second, or seconds a unit when slow."""
 
     def render(self, task: Task) -> Text:
+        if task.fields.get("seconds"):
+            return Text("")
         speed = task.finished_speed or task.speed
         if not speed:
             return Text("")
         return Text(f"{speed:.1f}/s" if speed >= 1 else f"{1 / speed:.1f} s each", style="dim")
+
+
+class Count(MofNCompleteColumn):
+    """Units done of all, where they are not seconds."""
+
+    def render(self, task: Task) -> Text:
+        return Text("") if task.fields.get("seconds") else super().render(task)
 
 
 class reporter:
@@ -119,6 +145,9 @@ class reporter:
         self.told = time.monotonic()
         self.parts: list[tuple[str, float]] = []
         """What was begun, and when."""
+        context = click.get_current_context(silent=True)
+        self.whole: Whole | None = context.obj if context else None
+        """The run that this stage is a part of, if it is."""
 
     def __enter__(self) -> Progress:
         if self.common.quiet:
@@ -130,9 +159,11 @@ class reporter:
         """What shows progress where stderr goes to."""
         if not sys.stderr.isatty():
             return self.line
-        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
+        columns = (TextColumn("{task.description}"), BarColumn(), Count(), Rate(), TimeRemainingColumn())
         self.bar = Bar(*columns, console=Console(stderr=True), transient=True)
         self.bar.start()
+        if self.whole:
+            self.tasks["all"] = self.bar.add_task("all of it", seconds=True)
         return self.draw
 
     def __exit__(self, *error: object) -> None:
@@ -159,14 +190,21 @@ class reporter:
         if label not in self.tasks:
             self.tasks[label] = self.bar.add_task(what, total=total or None)
         self.bar.update(self.tasks[label], description=what, completed=done, total=total or None)
+        if self.whole:
+            self.whole.heed(label, done, total)
+            spent = self.whole.elapsed()
+            self.bar.update(self.tasks["all"], completed=spent, total=spent + self.whole.left())
 
     def line(self, what: str, done: int, total: int) -> None:
         """Progress in a log: one line at most every LINE_EVERY seconds."""
         now = time.monotonic()
+        if self.whole:
+            self.whole.heed(what.split(" (")[0], done, total)
         start, first = self.started.setdefault(what.split(" (")[0], (now, done))
         if now - self.told < LINE_EVERY:
             return
         self.told = now
         left = f", {(now - start) / (done - first) * (total - done):.0f} s left" if first < done < total else ""
         count = f" {done}/{total}" if total else ""
-        click.echo(f"{what}{count}{left}", err=True)
+        whole = f"; {told(self.whole.left())} in all" if self.whole else ""
+        click.echo(f"{what}{count}{left}{whole}", err=True)

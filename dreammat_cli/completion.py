@@ -3,6 +3,8 @@
 import click
 from click.shell_completion import get_completion_class
 
+from dreammat_cli.common import examples
+
 WHERE = {
     "bash": '  echo \'eval "$(dreammat completion bash)"\' >> ~/.bashrc',
     "zsh": '  echo \'eval "$(dreammat completion zsh)"\' >> ~/.zshrc',
@@ -10,7 +12,9 @@ WHERE = {
 }
 
 
-@click.command(epilog="\b\nTo have it in every new shell:\n" + "\n".join(WHERE.values()))
+@click.command(
+    epilog=examples("dreammat completion bash") + "\n\n\b\nTo have it in every new shell:\n" + "\n".join(WHERE.values())
+)
 @click.argument("shell", type=click.Choice(tuple(WHERE)))
 def command(shell: str) -> None:
     """Print the script that makes SHELL complete dreammat's commands and options."""

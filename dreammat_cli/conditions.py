@@ -5,13 +5,19 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, examples, lines_of, plan, reporter, show
 from stages.conditions.options import ConditionsOptions
 
 DEFAULT = defaults(ConditionsOptions)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat conditions chair/prep.npz -o chair/conditions",
+        "dreammat conditions chair/prep.npz -o chair/conditions --views 32 --env studio --env my_office.hdr",
+        "dreammat conditions chair/prep.npz -o chair/conditions --size 512 --profile sd",
+    )
+)
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="The conditions folder to write.")
 @click.option("--views", type=click.IntRange(1, 9999), default=DEFAULT["views"], show_default=True, help="Cameras.")

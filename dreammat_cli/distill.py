@@ -7,7 +7,18 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, library_option, lines_of, plan, reporter, show
+from dreammat_cli.common import (
+    INPUT,
+    Common,
+    common_options,
+    defaults,
+    examples,
+    library_option,
+    lines_of,
+    plan,
+    reporter,
+    show,
+)
 from stages.core.progress import Tell, untold
 from stages.distill.options import GIVEN, LOSSES, QUALITY, DistillOptions, HoldOptions, ScoreOptions
 from stages.sd.options import SdOptions
@@ -61,7 +72,14 @@ def explain_words(common: Common, conditions: Path, options: DistillOptions) -> 
     show(common, {"prompt": options.prompt, "metres": recipe.base.metres, "coats": rows}, [*table(recipe), *lines])
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        'dreammat distill chair/conditions --prompt "a carved oak chair" -o chair/material.npz',
+        'dreammat distill chair/conditions --prompt "a carved oak chair" -o chair/material.npz --explain',
+        'dreammat distill chair/conditions --prompt "walnut" --part seat "navy velvet" -o chair/material.npz',
+        "dreammat distill other/conditions --like chair/material.npz -o other/material.npz",
+    )
+)
 @click.argument("conditions", type=INPUT, metavar="CONDITIONS")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="MATERIAL.npz", help="The file to write.")
 @click.option("--prompt", default=DEFAULT["prompt"], metavar="TEXT", help='What it is made of: "oak", "rusty iron".')

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import click
 
-from dreammat_cli.common import Common, common_options, show
+from dreammat_cli.common import Common, common_options, examples, show
 
 NEEDED = {  # package: the module it brings
     "click": "click", "embreex": "embreex.mesh_construction", "numba": "numba", "numpy": "numpy", "OpenEXR": "OpenEXR",
@@ -48,7 +48,12 @@ class Finding(NamedTuple):
     remedy: str = ""
 
 
-@click.command(epilog="Example: dreammat doctor")
+@click.command(
+    epilog=examples(
+        "dreammat doctor",
+        "dreammat doctor --json",
+    )
+)
 @common_options
 def command(common: Common) -> None:
     """Check this machine: packages, cores, memory, disk, GPU, models, and two seconds of real work.

@@ -5,13 +5,19 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, examples, lines_of, plan, reporter, show
 from stages.edit.options import EditOptions
 
 DEFAULT = defaults(EditOptions)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat edit chair/asset -o chair/red --part seat --hue 20 --saturation 1.2",
+        "dreammat edit chair/red --part 'leg_*' --metallic 1",
+        "dreammat edit chair/red --undo",
+    )
+)
 @click.argument("asset", type=INPUT, metavar="ASSET")
 @click.option("-o", "--output", type=INPUT, metavar="FOLDER",
               help="The asset folder to write; an asset that is edited already may be changed itself, without this.")

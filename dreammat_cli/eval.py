@@ -6,13 +6,17 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, examples, lines_of, plan, reporter, show
 from stages.report.options import EvalOptions
 
 DEFAULT = defaults(EvalOptions)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat eval jobs/*/asset -o table2 --sd-model models/sd --clip models/clip --inception inception.pt",
+    )
+)
 @click.argument("assets", nargs=-1, required=True, type=INPUT, metavar="ASSET...")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write pictures and scores.")
 @click.option("--sd-model", required=True, metavar="FOLDER|ID", help="Stable Diffusion, whose pictures the FID compares with.")

@@ -4,11 +4,16 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, examples, plan, reporter, show
 from stages.asset.options import TARGETS, ExportOptions
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat export chair/asset -o chair/unreal --for unreal",
+        "dreammat export chair/asset -o chair/usd --for usd",
+    )
+)
 @click.argument("asset", type=INPUT, metavar="ASSET")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="The folder to write.")
 @click.option("--for", "target", type=click.Choice(TARGETS), required=True, metavar="TARGET",

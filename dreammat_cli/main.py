@@ -1,6 +1,5 @@
 """The `dreammat` command. Each subcommand lives in a file of its own and is imported only when it is called."""
 
-import difflib
 import importlib
 import os
 import signal
@@ -9,6 +8,7 @@ from importlib.metadata import version
 
 import click
 
+from dreammat_cli.common import Guessing
 from stages.core.errors import DreammatError
 
 COMMANDS = {
@@ -32,18 +32,15 @@ COMMANDS = {
 INTERRUPTED = 130
 
 
-class LazyGroup(click.Group):
+class LazyGroup(Guessing):
     """Imports a subcommand's module when it is called, so that --help is instant."""
 
     def list_commands(self, context: click.Context) -> list[str]:
         return list(COMMANDS)
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
-        if name not in COMMANDS:
-            close = difflib.get_close_matches(name, COMMANDS, 1)
-            hint = f"did you mean {close[0]!r}?" if close else f"there are {', '.join(COMMANDS)}"
-            raise click.UsageError(f"No such command {name!r}: {hint}", context)
-        return importlib.import_module(f"dreammat_cli.{name}").command
+        super().get_command(context, name)
+        return importlib.import_module(f"dreammat_cli.{name}").command if name in COMMANDS else None
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -4,13 +4,18 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, library_option, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, examples, library_option, plan, reporter, show
 from stages.swatch.options import SIZES, SwatchOptions
 
 DEFAULT = defaults(SwatchOptions)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        'dreammat material "rusty iron" -o rust',
+        'dreammat material "red brick" -o brick --size 4096 --metres 2',
+    )
+)
 @click.argument("prompt", metavar="PROMPT")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="The folder to write.")
 @click.option("--size", type=click.Choice(SIZES), default=DEFAULT["size"], show_default=True, metavar="TEXELS",

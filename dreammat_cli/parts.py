@@ -4,11 +4,16 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, examples, plan, show
 from stages.asset.options import PartsOptions
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat parts chair/prep.npz",
+        "dreammat parts chair/prep.npz -o chair/parts",
+    )
+)
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.option("-o", "--output", type=INPUT, metavar="FOLDER", help="Also draw them: parts.png and parts.json in this folder.")
 @click.option("--size", type=click.IntRange(64, 4096), default=defaults(PartsOptions)["size"], show_default=True,
@@ -19,7 +24,7 @@ def command(prep: Path, output: Path | None, common: Common, size: int) -> None:
 
     A part is called by its name, a pattern (wheel_*), slot:NAME, object:NAME, or its number (#3).
     """
-    if output is not None and plan(common, "draw the parts into", output, PartsOptions(size)):
+    if plan(common, "draw the parts into" if output else "list the parts of", output or prep, PartsOptions(size)):
         return
     from stages.asset.parts import named_parts
     from stages.core.artifact import load_npz

@@ -5,13 +5,19 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, common_options, defaults, examples, lines_of, plan, reporter, show
 from stages.prep.options import PrepOptions
 
 DEFAULT = defaults(PrepOptions)
 
 
-@click.command()
+@click.command(
+    epilog=examples(
+        "dreammat prep chair.obj -o chair/prep.npz",
+        "dreammat prep scan.ply -o scan/prep.npz --up z --unwrap-seconds 20",
+        "dreammat prep room.glb --split room --prompts prompts.toml",
+    )
+)
 @click.argument("mesh", type=INPUT, metavar="MESH")
 @click.option("-o", "--output", type=INPUT, metavar="PREP.npz", help="The file to write.")
 @click.option("--split", "folder", type=INPUT, metavar="FOLDER",

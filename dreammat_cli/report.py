@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, Guessing, common_options, defaults, examples, plan, reporter, show
 from stages.report.options import (
     DistillReportOptions,
     OcclusionReportOptions,
@@ -21,12 +21,12 @@ DEFAULT, PRIOR, DISTILL = defaults(ReportOptions), defaults(PriorReportOptions),
 OCCLUSION, UNWRAP = defaults(OcclusionReportOptions), defaults(UnwrapReportOptions)
 
 
-@click.group()
+@click.group(cls=Guessing)
 def command() -> None:
     """Measure speed against error."""
 
 
-@command.command()
+@command.command(epilog=examples("dreammat report conditions demo/prep.npz -o bench"))
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV and the plot.")
 @click.option("--size", type=click.IntRange(16, 2048), default=DEFAULT["size"], show_default=True, metavar="PIXELS",
@@ -51,7 +51,12 @@ def conditions(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
     show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, summary(rows))
 
 
-@command.command()
+@command.command(
+    epilog=examples(
+        "dreammat report prior -o prior --seeds 2",
+        "dreammat report prior chair.obj -o prior --prompts 12 --no-ladder",
+    )
+)
 @click.argument("mesh", nargs=-1, metavar="[MESH]...")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write runs, CSV and pictures.")
 @click.option("--seeds", type=click.IntRange(1, 100), default=PRIOR["seeds"], show_default=True, help="Runs of every prompt.")
@@ -79,7 +84,7 @@ def prior(mesh: tuple[str, ...], output: Path, common: Common, **chosen: Any) ->
     show(common, {"summary": [dataclasses.asdict(line) for line in lines]}, table)
 
 
-@command.command()
+@command.command(epilog=examples("dreammat report distill chair/conditions -o cost --device cuda"))
 @click.argument("conditions", type=INPUT, metavar="CONDITIONS")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV.")
 @click.option("--sd-model", default=DISTILL["sd_model"], metavar="PATH|ID", help="As for `distill`.  [default: random weights]")
@@ -104,7 +109,11 @@ def distill(conditions: Path, output: Path, common: Common, **chosen: Any) -> No
     show(common, dataclasses.asdict(report), summary(report))
 
 
-@command.command()
+@command.command(
+    epilog=examples(
+        "dreammat report transfer chair/prep.npz chair/material.npz chair/asset --reference textured.glb",
+    )
+)
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.argument("material", type=INPUT, metavar="MATERIAL.npz")
 @click.argument("asset", type=INPUT, metavar="ASSET")
@@ -120,7 +129,7 @@ def transfer(prep: Path, material: Path, asset: Path, common: Common, reference:
     show(common, found, [f"{name.replace('_', ' '):18} {value:.4g}" for name, value in found.items()])
 
 
-@command.command()
+@command.command(epilog=examples("dreammat report occlusion chair/prep.npz -o occlusion --rays 64 --rays 256"))
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV and the picture.")
 @click.option("--size", type=click.IntRange(64, 8192), default=OCCLUSION["size"], show_default=True, metavar="TEXELS",
@@ -143,7 +152,7 @@ def occlusion(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
     show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, [str(output / "occlusion.png"), *summary(rows)])
 
 
-@command.command()
+@command.command(epilog=examples("dreammat report unwrap chair/prep.npz"))
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
 @click.option("--gutter", type=click.IntRange(0, 512), default=UNWRAP["gutter"], show_default=True, metavar="TEXELS",
               help="Between xatlas's charts, where PREP.npz kept the source's UVs.")
@@ -161,7 +170,7 @@ def unwrap(prep: Path, common: Common, **chosen: Any) -> None:
     show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, summary(rows))
 
 
-@command.command()
+@command.command(epilog=examples("dreammat report materials -o materials"))
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write sheets and CSV.")
 @click.option("--references", type=INPUT, metavar="FOLDER", help="Real sets, NAME_01/basecolor.png each, to measure beside.")
 @common_options
@@ -174,7 +183,7 @@ def materials(output: Path, references: Path | None, common: Common) -> None:
     show(common, {"rows": [{"name": row.name, "slope": row.contrast.slope, "own": row.own} for row in rows]}, summary(rows))
 
 
-@command.command()
+@command.command(epilog=examples("dreammat report preview chair/asset -o beside --three node_modules"))
 @click.argument("assets", type=INPUT, nargs=-1, required=True, metavar="ASSET...")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the CSV and the pictures.")
 @click.option("--cycles", default="", metavar="PYTHON", help="A Python that has the package bpy (Blender).")

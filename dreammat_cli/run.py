@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options
+from dreammat_cli.common import INPUT, Common, common_options, examples
+from dreammat_cli.whole import Whole, foretold
 
 STAGES = ("prep", "conditions", "distill", "bake")
 
@@ -18,7 +19,11 @@ LARGEST = (0.005, 200.0)
 
 
 @click.command(
-    epilog='Example: dreammat run chair.obj --prompt "a carved oak chair" -o chair --with conditions "--views 64"'
+    epilog=examples(
+        'dreammat run chair.obj --prompt "a carved oak chair" -o chair',
+        'dreammat run chair.obj --prompt "rusty iron" -o chair --with conditions "--views 64" --with bake "--size 4096"',
+        "dreammat run chair.obj --prompt \"walnut\" -o chair --with distill \"--part seat 'navy velvet'\"",
+    )
 )
 @click.argument("mesh", type=INPUT, metavar="MESH")
 @click.option("--prompt", required=True, metavar="TEXT", help='What it is made of: "oak", "rusty iron".')
@@ -47,16 +52,18 @@ def command(mesh: Path, prompt: str, output: Path, further: tuple[tuple[str, str
         "distill": [conditions, "--prompt", prompt, "-o", material, *size],
         "bake": [prep, material, "-o", output / "asset"],
     }
-    contexts: dict[str, click.Context] = {}
+    above, contexts = click.get_current_context().parent, {}
     for stage in stages:  # all options are read before anything long begins
         options = [word for name, text in further if name == stage for word in split(text)]
         words = [*map(str, arguments[stage]), *options, *common.flags()]
-        contexts[stage] = import_module(f"dreammat_cli.{stage}").command.make_context(f"dreammat {stage}", words)
-    for number, (stage, context) in enumerate(contexts.items(), 1):
+        contexts[stage] = import_module(f"dreammat_cli.{stage}").command.make_context(stage, words, above)
+    whole = Whole({stage: foretold(stage, context.params) for stage, context in contexts.items()})
+    for stage, context in contexts.items():
         if stage == "conditions" and not common.dry_run:
             expect_parts(prep, contexts["distill"].params["parts"])
+        context.obj, line = whole, whole.begin(stage)
         if not (common.quiet or common.as_json):
-            click.echo(f"[{number} of {len(stages)}] {stage}", err=True)
+            click.echo(line, err=True)
         with context:
             context.command.invoke(context)
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, lines_of, plan, reporter, show
+from dreammat_cli.common import INPUT, Common, Guessing, common_options, defaults, examples, lines_of, plan, reporter, show
 from stages.train.options import PicturesOptions, TrainControlnetOptions, TrainPriorOptions
 
 PRIOR, PICTURES, CONTROLNET = defaults(TrainPriorOptions), defaults(PicturesOptions), defaults(TrainControlnetOptions)
@@ -38,12 +38,12 @@ class Shard(click.ParamType):
         return int(part), int(parts)
 
 
-@click.group()
+@click.group(cls=Guessing)
 def command() -> None:
     """Train the diffusion models."""
 
 
-@command.command()
+@command.command(epilog=examples("dreammat train prior -o prior --device cuda"))
 @click.option("-o", "--out", type=INPUT, required=True, metavar="FOLDER", help="Data, checkpoint, curve, samples, weights.")
 @number(PRIOR, "steps", "Optimiser steps, those of the reader included.")
 @number(PRIOR, "text_steps", "First steps, in which the reader of prompts learns alone.", 0)
@@ -77,7 +77,7 @@ def prior(out: Path, common: Common, **chosen: Any) -> None:
     show(common, data, [f"{result.weights}{state}", *lines_of({"step": result.step})])
 
 
-@command.command()
+@command.command(epilog=examples("dreammat train pictures models -o pictures --captions captions.json"))
 @click.argument("models", type=INPUT, metavar="MODELS")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER", help="Where to write the pictures.")
 @click.option("--captions", type=INPUT, default=PICTURES["captions"], metavar="FILE.json",
@@ -113,7 +113,7 @@ def pictures(models: Path, output: Path, common: Common, **chosen: Any) -> None:
     show(common, result.content, [str(result.manifest), *lines_of(counts), *lines_of(reasons)])
 
 
-@command.command()
+@command.command(epilog=examples("dreammat train controlnet pictures -o run --sd-model models/stable-diffusion-2-1-base"))
 @click.argument("pictures", type=INPUT, metavar="PICTURES")
 @click.option("-o", "--output", type=INPUT, required=True, metavar="FOLDER",
               help="controlnet/, checkpoint, curve and samples.")

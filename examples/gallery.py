@@ -1,7 +1,7 @@
 """Textures six public meshes and puts them in one picture: python examples/gallery.py MESHES OUT.jpg
 
-MESHES holds the files named below, fetched from their repositories on GitHub. What is made stays beside OUT, so another run
-is quick.
+MESHES is a folder that holds the files named below, fetched from their repositories on GitHub. What is made stays by OUT, so
+another run is quick.
 """
 
 import subprocess
@@ -11,50 +11,76 @@ from typing import NamedTuple
 
 import numpy as np
 import OpenImageIO as oiio
+from numpy.typing import NDArray
 
 
 class Piece(NamedTuple):
-    """One picture. view: its place in preview.png, row and column."""
+    """One picture. view: its place in preview.png, row and column. parts: what some parts are made of, by their names."""
 
     file: str
     source: str
     licence: str
     prompt: str
     view: tuple[int, int]
+    parts: tuple[tuple[str, str], ...] = ()
 
+
+ENAMEL = "teal enamel chipping off iron"
 
 PIECES = (
-    Piece("skull.obj", "odedstein/meshes", "CC BY 3.0", "weathered bronze with verdigris in the crevices", (0, 1)),
-    Piece("armchair.obj", "NVIDIAGameWorks/kaolin", "CC BY 4.0", "brown leather armchair, walnut feet", (0, 1)),
+    Piece("nefertiti_1m.ply", "odedstein/meshes", "public domain", "weathered bronze with verdigris in the crevices", (0, 1)),
+    Piece("vintage_fan.glb", "BabylonJS/MeshesLibrary", "CC BY 4.0", "polished brass", (0, 1),
+          (("fanBase_low", ENAMEL), ("#6", ENAMEL), ("fanBlade_low", "polished copper"))),
+    Piece("armchair.obj", "NVIDIAGameWorks/kaolin", "CC BY 4.0", "black steel", (1, 3),
+          (("M_Armchair_Cushions", "worn brown leather"),)),
     Piece("spot.obj", "odedstein/meshes", "public domain", "white porcelain with cobalt stripes", (0, 1)),
-    Piece("gazebo.obj", "jpcy/xatlas", "MIT", "white painted wood, slate roof, old brick base", (0, 0)),
     Piece("plane_holes.obj", "odedstein/meshes", "CC BY 3.0", "olive green paint chipping off aluminium", (0, 3)),
-    Piece("trellis_T.ply", "microsoft/TRELLIS", "MIT", "old oak with rusty iron edges", (0, 1)),
-)
+    Piece("skull.obj", "odedstein/meshes", "CC BY 3.0", "white marble with veins of gold", (0, 1)),
+)  # fmt: skip
 
-PIXELS = 512
+DRAWN, PIXELS = 800, 480
+"""Side of a view as it is drawn, and as it is shown."""
+
+MARGIN = 0.06
+"""Free on each side of an object, as a share of its picture."""
 
 
 def main(meshes: Path, out: Path) -> None:
     """Make all and write the picture, three in a row."""
-    tiles = [tile(piece, meshes, out.parent) for piece in PIECES]
-    rows = [np.concatenate(tiles[i : i + 3], 1) for i in range(0, len(tiles), 3)]
-    picture = np.concatenate(rows, 0)
-    spec = oiio.ImageSpec(picture.shape[1], picture.shape[0], 3, "uint8")
-    spec["jpeg:quality"] = 90
-    file = oiio.ImageOutput.create(str(out))
-    if not (file and file.open(str(out), spec) and file.write_image(np.ascontiguousarray(picture)) and file.close()):
-        sys.exit(f"{out}: cannot be written")
+    tiles = [framed(view_of(piece, meshes, out.parent)) for piece in PIECES]
+    picture = np.concatenate([np.concatenate(tiles[row : row + 3], 1) for row in range(0, len(tiles), 3)], 0)
+    buffer = oiio.ImageBuf(np.ascontiguousarray(picture))
+    buffer.specmod()["jpeg:quality"] = 88
+    if not buffer.write(str(out)):
+        sys.exit(f"{out}: cannot be written ({buffer.geterror()})")
 
 
-def tile(piece: Piece, meshes: Path, folder: Path) -> np.ndarray:
-    """One view of one piece, (PIXELS, PIXELS, 3) uint8."""
-    job = folder / Path(piece.file).stem
-    command = [sys.executable, "-m", "dreammat_cli", "run", str(meshes / piece.file), "--prompt", piece.prompt, "-o", str(job)]
-    subprocess.run([*command, "--with", "conditions", "--views 32", "--with", "bake", f"--preview-size {PIXELS}"], check=True)
-    pixels = oiio.ImageBuf(str(job / "asset/preview.png")).get_pixels(oiio.UINT8)
+def view_of(piece: Piece, meshes: Path, folder: Path) -> NDArray[np.uint8]:
+    """One view of a piece, (DRAWN, DRAWN, 3)."""
+    mesh = next(meshes.rglob(piece.file), None)
+    if mesh is None:
+        sys.exit(f"{meshes}: has no {piece.file}; get it from https://github.com/{piece.source}")
+    job = folder / mesh.stem
+    parts = " ".join(f"--part '{name}' '{words}'" for name, words in piece.parts)
+    options = {"conditions": "--views 24", "distill": parts, "bake": f"--preview-size {DRAWN}"}
+    with_options = [word for stage, text in options.items() for word in ("--with", stage, text)]
+    command = [sys.executable, "-m", "dreammat_cli", "run", str(mesh), "--prompt", piece.prompt, "-o", str(job), *with_options]
+    subprocess.run(command, check=True)
     row, column = piece.view
-    return pixels[row * PIXELS : (row + 1) * PIXELS, column * PIXELS : (column + 1) * PIXELS, :3]
+    pixels = oiio.ImageBuf(str(job / "asset/preview.png")).get_pixels(oiio.UINT8)
+    return pixels[row * DRAWN : (row + 1) * DRAWN, column * DRAWN : (column + 1) * DRAWN, :3]
+
+
+def framed(view: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The object in the middle of its picture, as large as fits, (PIXELS, PIXELS, 3). The backdrop has one colour a row."""
+    seen = np.abs(view.astype(int) - view[:, :1]).max(2) > 6
+    rows, columns = np.flatnonzero(seen.any(1)), np.flatnonzero(seen.any(0))
+    side = round(max(np.ptp(rows), np.ptp(columns)) / (1 - 2 * MARGIN))
+    top, left = (rows[0] + rows[-1] - side) // 2, (columns[0] + columns[-1] - side) // 2
+    wide = np.pad(view, ((side, side), (side, side), (0, 0)), "edge")
+    square = wide[top + side : top + 2 * side, left + side : left + 2 * side]
+    small = oiio.ROI(0, PIXELS, 0, PIXELS, 0, 1, 0, 3)
+    return oiio.ImageBufAlgo.resize(oiio.ImageBuf(np.ascontiguousarray(square)), roi=small).get_pixels(oiio.UINT8)
 
 
 if __name__ == "__main__":

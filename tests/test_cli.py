@@ -4,9 +4,12 @@ import json
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+
+from dreammat_cli.whole import Whole
 
 OK, USAGE, INPUT, ARTIFACT, OUTPUT = 0, 2, 3, 4, 5
 
@@ -137,6 +140,7 @@ def test_missing_and_foreign_artefacts(mesh: Path, tmp_path: Path) -> None:
     expect_error(dreammat("prep", "gone.obj", "-o", prep, cwd=tmp_path), INPUT, "gone.obj")
     expect_error(dreammat("conditions", "gone.npz", "-o", "c", cwd=tmp_path), ARTIFACT, "gone.npz")
     expect_error(dreammat("conditions", mesh, "-o", "c", cwd=tmp_path), ARTIFACT, "triangle.obj")
+    expect_error(dreammat("conditions", prep, "-o", "c", "--env", "studoi", cwd=tmp_path), INPUT, "did you mean 'studio'?")
     distill = dreammat("distill", tmp_path, "--prompt", "gold", "-o", "m.npz", cwd=tmp_path)
     expect_error(distill, ARTIFACT, "manifest.json")
     expect_error(dreammat("bake", prep, prep, "-o", "a", cwd=tmp_path), ARTIFACT, "dreammat.prep", "dreammat.material")
@@ -163,6 +167,7 @@ def test_full_disk(mesh: Path) -> None:
 
 def test_a_command_that_is_not_there_is_guessed(tmp_path: Path) -> None:
     expect_error(dreammat("bkae", cwd=tmp_path), USAGE, "'bkae'", "did you mean 'bake'")
+    expect_error(dreammat("train", "picutres", cwd=tmp_path), USAGE, "'picutres'", "did you mean 'pictures'")
     expect_error(dreammat("prep", "--texture-sise", "64", cwd=tmp_path), USAGE, "--texture-size")
 
 
@@ -175,6 +180,34 @@ def test_run_hands_each_stage_its_options(mesh: Path, tmp_path: Path) -> None:
     assert (conditions["views"], conditions["env"]) == (3, ["night"])
     assert (bake["size"], bake["supersample"]) == (512, 2)
     assert [p.name for p in tmp_path.iterdir()] == ["triangle.obj"]
+
+
+def test_a_run_tells_how_long_all_of_it_will_take(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = [0.0]
+    monkeypatch.setattr(time, "monotonic", lambda: clock[0])
+    whole = Whole({"prep": 10, "conditions": 100, "distill": 20, "bake": 30})
+    assert whole.begin("prep") == "[1 of 4] prep, about 3 min left in all"
+    clock[0] = 10.0
+    whole.begin("conditions")
+    assert whole.left() == 150
+    for views, now in ((0, 15.0), (10, 35.0)):  # two seconds a view, after five of reading
+        clock[0] = now
+        whole.heed("views", views, 100)
+    assert whole.left() == pytest.approx(180 + 2.05 * 50)
+    clock[0] = 215.0
+    assert whole.begin("distill") == "[3 of 4] distill, about 2 min left in all"
+    whole.heed("texels", 1, 2)
+    assert whole.left() == pytest.approx(2.05 * 50)
+    clock[0] = 1000.0
+    whole.begin("bake")
+    clock[0] = 2000.0
+    assert whole.left() == 0
+
+
+def test_a_run_tells_each_stage_and_what_is_left(mesh: Path, tmp_path: Path) -> None:
+    told = dreammat("run", mesh, "--prompt", "oak", "-o", tmp_path / "x", "--dry-run", cwd=tmp_path).stderr.splitlines()
+    assert [line.split(",")[0] for line in told] == [f"[{k} of 4] {name}" for k, name in enumerate(STAGES[1:5], 1)]
+    assert all(line.endswith("left in all") for line in told)
 
 
 def test_verbose_tells_the_seconds_of_each_part(mesh: Path, tmp_path: Path) -> None:

@@ -3,28 +3,36 @@
 import importlib.util
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
+import click
 import pytest
 from click.testing import CliRunner
 
 from dreammat_cli.main import cli
+from tests.pages import PAGES, ROOT, blocks
 
-ROOT = Path(__file__).resolve().parent.parent
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 WITHOUT_DRY_RUN = ("doctor", "completion", "report", "eval", "train")
 
 
+def leaves(group: click.Group, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], click.Command]]:
+    """Every command that does something, and the words that call it."""
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if isinstance(command, click.Group):
+            yield from leaves(command, (*path, name))
+        elif command:
+            yield (*path, name), command
+
+
 def commands() -> list[tuple[str, str]]:
-    """Every call of dreammat in the pages' shell blocks: (page, line)."""
-    found = []
-    for page in PAGES:
-        text = page.read_text()
-        blocks = re.findall(r"```sh\n(.*?)```", text, re.S) + re.findall(r"(?:^    .*\n)+", text, re.M)
-        for line in "\n".join(blocks).replace("\\\n", " ").splitlines():
-            if line.strip().startswith("dreammat ") and "…" not in line:
-                found.append((page.name, line.strip()))
-    return found
+    """Every call of dreammat in the pages' shell blocks, and in the examples of each --help: (page, line)."""
+    texts = {page.name: "\n".join(block.text for block in blocks(page) if block.language == "sh") for page in PAGES}
+    texts |= {f"{' '.join(path)} --help": command.epilog or "" for path, command in leaves(cli)}
+    lines = [(page, line.strip()) for page, text in texts.items() for line in text.replace("\\\n", " ").splitlines()]
+    return [(page, line) for page, line in lines if line.startswith("dreammat ")]
 
 
 @pytest.mark.parametrize(("page", "line"), commands())
@@ -37,7 +45,18 @@ def test_commands_are_right_as_they_are_written(page: str, line: str, tmp_path: 
 
 
 def test_there_are_commands() -> None:
-    assert len(commands()) >= 12
+    assert len([page for page, _ in commands() if page.endswith(".md")]) >= 25
+
+
+@pytest.mark.parametrize(("path", "command"), [pytest.param(*leaf, id=" ".join(leaf[0])) for leaf in leaves(cli)])
+def test_help_ends_with_examples_of_the_command(path: tuple[str, ...], command: click.Command) -> None:
+    assert any(line.strip().startswith(" ".join(("dreammat", *path))) for line in (command.epilog or "").splitlines())
+
+
+def test_the_pages_have_blocks_that_run() -> None:
+    found = [block for page in PAGES for block in blocks(page)]
+    assert sum(not block.why_not for block in found) >= 20 and sum(bool(block.why_not) for block in found) <= 10
+    assert not [page.name for page in PAGES if re.search(r"^    (\$ )?(dreammat|make|pip) ", page.read_text(), re.M)]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

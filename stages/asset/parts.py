@@ -21,6 +21,7 @@ from scipy.sparse.csgraph import connected_components
 
 from stages.core.artifact import Artifact
 from stages.core.errors import InputError
+from stages.core.naming import guess
 
 KINDS = ("object", "slot", "piece")
 
@@ -203,7 +204,8 @@ def find(parts: list[Part], pattern: str) -> list[Part]:
         found = found or [part for part in named if fnmatch.fnmatchcase(part.name, wanted)]
         found = found or [part for part in named if fnmatch.fnmatchcase(part.name.lower(), wanted.lower())]
     if not found:
-        raise InputError(f"part '{pattern}': there is none of this name; expected {listed(parts)}")
+        meant = guess(wanted, [part.name for part in of_kind if part.name])
+        raise InputError(f"part '{pattern}': there is none of this name; {meant}expected {listed(parts)}")
     return found
 
 

@@ -32,6 +32,7 @@ from stages.core.artifact import (
     write_manifest,
 )
 from stages.core.errors import InputError, NumericalError, OutputError
+from stages.core.naming import guess
 from stages.core.progress import Progress, silent
 from stages.core.schemas import CAMERAS, CONDITIONS, PREP, SURVEY
 from stages.core.shading import KNOTS, Transport
@@ -148,6 +149,9 @@ def read_lights(env: tuple[str, ...]) -> tuple[list[Environment], dict[str, int]
     for choice in env or tuple(BUILTIN):
         if choice in BUILTIN:
             light, mended = BUILTIN[choice](), 0
+        elif not Path(choice).suffix:
+            expected = f"expected {', '.join(BUILTIN)}, or a .hdr or .exr file"
+            raise InputError(f"--env {choice}: no such light; {guess(choice, BUILTIN)}{expected}")
         else:
             light, mended = load_environment(Path(choice))
             hashes[f"environment {light.name}"] = sha256_file(Path(choice))

@@ -1,6 +1,8 @@
 """Names for files and for what other programs call things."""
 
+import difflib
 import re
+from collections.abc import Iterable
 
 
 def identifier(name: str) -> str:
@@ -20,3 +22,10 @@ def unique(names: list[str]) -> list[str]:
         taken.add(candidate.lower())
         result.append(candidate)
     return result
+
+
+def guess(name: str, known: Iterable[str]) -> str:
+    """What was probably meant by a name that nothing has, for an error to say: "did you mean 'seat'? ", or nothing."""
+    called = {one.lower(): one for one in known}
+    near = difflib.get_close_matches(name.lower(), called, 1)
+    return f"did you mean '{called[near[0]]}'? " if near else ""

@@ -14,6 +14,7 @@ from typing import Any
 
 from stages.core.artifact import reason
 from stages.core.errors import InputError, one_line
+from stages.core.naming import guess
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -55,7 +56,8 @@ def prompts_of(objects: Sequence[dict[str, Any]], prompts: dict[str, str], path:
         if not called:
             names = [str(one["title"]) for one in objects]
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-            raise InputError(f"{path}: '{pattern}' names no object of the scene; expected {', '.join(names[:LISTED])}{more}")
+            there = f"{guess(pattern, names)}expected {', '.join(names[:LISTED])}{more}"
+            raise InputError(f"{path}: '{pattern}' names no object of the scene; {there}")
         found |= dict.fromkeys(called, prompt)
     return found
 

@@ -111,6 +111,7 @@ def test_prompts_are_written_where_names_and_patterns_fit(jobs: Path, tmp_path: 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
+        ('tabel = "oak"', "'tabel' names no object of the scene; did you mean 'table'? expected floor"),
         ('sofa = "velvet"', "'sofa' names no object of the scene; expected floor, table, vase/blue"),
         ("stool.001 = 'elm'", 'stool is a table; expected "NAME" = "prompt", names with dots in quotes'),
         ("table = 3", "table is 3; expected a prompt in quotes"),
