@@ -40,7 +40,8 @@ METALS = (
     _metal("aluminium, aluminum", "#f5f6f6, #e9ebee", (0.15, 0.5)),
     _metal("brass, yellow brass", "#f4e2ae, #ecd28a", weight=2),
     _metal("bronze, cast bronze", "#d9a877, #cc9a66, #b98a55", (0.15, 0.5), 2),
-    _metal("iron, wrought iron, cast iron, raw iron", "#c4c6c8, #b0b0b0, #96979a", (0.3, 0.6), 2),
+    _metal("iron, raw iron", "#c4c6c8, #b0b0b0, #96979a", (0.3, 0.6), 2),
+    _metal("cast iron, wrought iron", "#5a5958, #4e4d4c, #444343", (0.45, 0.7)),  # under its own black oxide
     _metal("steel, stainless steel, steel metal", "#c6c6c4, #cfd0d0, #b8babd", (0.1, 0.45), 3),
     _metal("chrome, chromium, chrome plated metal", "#c4c5c5, #d5d6d8", (0.0, 0.1), 2.5),
     _metal("titanium", "#c1b9b1, #b3aba4", (0.2, 0.5), 1.5),

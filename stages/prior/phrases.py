@@ -10,9 +10,9 @@ from itertools import pairwise
 
 from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.objects import OBJECTS
-from stages.prior.places import ANIMALS, GATHERS, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
+from stages.prior.places import ANIMALS, GATHERS, ONCE, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
 from stages.prior.stuffs import BOARDS, COATINGS, GENERIC, KNOWN, PATTERNED, ROOFS
-from stages.prior.tokens import Join, Token, singulars, tokens_of
+from stages.prior.tokens import FOODS, PAINTED, Join, Token, singulars, tokens_of
 
 FIRST = Join("")
 """Before what nothing stands."""
@@ -26,7 +26,8 @@ class Phrase:
     words. weather: of `WEATHER`, `FADED`, `WET`. unknown: words that no table knows. thing: of `OBJECTS`. animal: of `ANIMALS`.
     region: where it lies. where: the word that said so. placed: whether that word came last. shows: what is beneath, where
     it is said. much: factor of the share that it covers; amount: the same of each word of weather. part: the name of a part
-    that no table knows. closed: whether what it is was said, "a statue of". within: the part that it lies on. """
+    that no table knows. closed: whether what it is was said, "a statue of". headed:
+    whether the thing was named after its stuff. within: the part that it lies on. """
 
     join: Join = FIRST
     substance: str = ""
@@ -46,6 +47,7 @@ class Phrase:
     amount: dict[str, float] = field(default_factory=dict)
     part: str = ""
     closed: bool = False
+    headed: bool = False
     within: "Phrase | None" = None
 
     @property
@@ -73,6 +75,10 @@ class Phrase:
         """Whether it says nothing at all."""
         return not (self.says_what or self.region or self.finish or self.weather or self.size or self.colors)
 
+    def amount_of(self, words: Container[str]) -> bool:
+        """Whether it is said how much there is of one of some weathers: "slightly charred"."""
+        return any(word in words and much != 1 for word, much in self.amount.items())
+
     def of_kind(self, kind: str) -> list[str]:
         """The words of a kind of token."""
         kinds = {"color": self.colors, "finish": self.finish, "weather": self.weather, "unknown": self.unknown}
@@ -97,7 +103,7 @@ def split(
         words that are no slips of the pen.
     """
     phrases = [Phrase()]
-    much = 1.0
+    much, within = 1.0, False
     tokens = [
         token if token.kind != "unknown" or matters(token.text) else token._replace(kind="name")
         for token in tokens_of(prompt, explained or {}, real)
@@ -120,16 +126,18 @@ def split(
                 now.closed = True
             if token.kind == "join" and token.value.kind == "peel" and "peeling" not in now.weather:
                 now.weather.append("peeling")
+            within = token.text == "in" or (within and token.kind not in ("join", "postfix", "comma", "half"))
             if token.kind in ("join", "postfix", "comma", "half"):
                 continue
-            if _begins(token, now):
+            if _begins(token, now) and not (within and _lacks(token, now)):
                 now = Phrase(Join("paint" if token.text in PAINTED else "with"))
                 phrases.append(now)
             _take(now, token)
         elif now.empty:
             now.join = join if len(phrases) > 1 else now.join
         else:
-            if join.kind in ("above", "below") and now.region is None and following.kind in ("comma", "end", "join"):
+            free = now.region is None or now.where in SHAPES
+            if join.kind in ("above", "below") and free and following.kind in ("comma", "end", "join"):
                 now.region, now.where = Region(join.kind, 0.5), token.text  # "gold above, oak below"
                 continue
             phrases.append(Phrase(join))
@@ -172,9 +180,6 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
     return token.value  # type: ignore[no-any-return]
 
 
-PAINTED = ("painted", "lacquer", "enamel", "whitewash", "gilded")
-"""What is said of a stuff after its name: "iron painted black"."""
-
 
 def _stands_for_itself(token: Token, now: Phrase, following: Token) -> bool:
     """Whether what may be a part is the thing itself: "a helmet in olive drab"."""
@@ -183,11 +188,20 @@ def _stands_for_itself(token: Token, now: Phrase, following: Token) -> bool:
 
 def _begins(token: Token, now: Phrase) -> bool:
     """Whether a token begins a phrase although no word joins it to the one before: "gold rim white porcelain"."""
+    text = token.text
     if token.kind == "substance":
-        if now.color_only and now.join.kind == "and" and now.where in SHAPES:
-            return False  # "black and white checkerboard tiles"
-        return now.placed or bool(now.substance and (now.thing or (token.text in PAINTED and not now.coats)))
+        if now.where in SHAPES and not now.substance:
+            return False  # "black and white checkerboard tiles", "red gingham cotton"
+        again = bool(now.substance) and text in (*GENERIC, *BOARDS) and _family(text) == _family(now.substance)
+        if again and not now.placed:
+            return False  # "a golem of cooled lava rock"
+        return now.placed or bool(now.substance and (now.headed or (token.text in PAINTED and not now.coats)))
     return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS))
+
+
+def _lacks(token: Token, now: Phrase) -> bool:
+    """Whether a token says of a phrase what it does not say yet: "grips in charcoal", "handles in oak"."""
+    return not (now.substance if token.kind == "substance" else any(map(is_hue, now.colors)))
 
 
 def _take(phrase: Phrase, token: Token) -> None:
@@ -201,18 +215,18 @@ def _take(phrase: Phrase, token: Token) -> None:
             said.append(text)
     elif kind == "part" and phrase.thing and phrase.join is FIRST:
         return  # "a bicycle frame" is all frame
+    elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.substance and phrase.join.kind in ("", "and"):
+        return  # "a checkerboard marble plinth"
     elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
         phrase.thing = text  # "striped cushion"
-    elif kind in ("part", "shape") and (phrase.region is None or kind == "part"):
+    elif kind in ("part", "shape") and (phrase.region is None or kind == "part" or text in PAINTS):
         phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
     elif kind == "thing" and not phrase.closed:
-        phrase.thing = text  # the last of a run says what it is: "school bus"
+        phrase.thing, phrase.headed = text, bool(phrase.substance)  # the last of a run says what it is: "school bus"
     elif kind == "name" and (phrase.substance or phrase.colors) and not phrase.region:
         phrase.part = text
     elif kind == "animal":
         phrase.animal = text
-    elif kind == "dyed" and phrase.substance:
-        phrase.colors, phrase.substance = [*phrase.colors, phrase.substance], ""
 
 
 ROUGHENED = ("frosted", "matte")
@@ -225,13 +239,20 @@ def _name(phrase: Phrase, text: str) -> None:
     first = text.split(" ")[0]
     if " " in text and first in ROUGHENED and first not in phrase.finish:
         phrase.finish.append(first)
-    if text.endswith((" wall", " walls")) and phrase.region is None:
-        phrase.region, phrase.where = PARTS["walls"], "walls"
+    if text.endswith((" wall", " walls", " sole")) and phrase.region is None:
+        phrase.where = "sole" if text.endswith("sole") else "walls"
+        phrase.region = PARTS[phrase.where]
     phrase.boards = phrase.boards or text in BOARDS
     if not old:
         phrase.substance = text
-    elif phrase.colors and KNOWN[old][0].look == "tartan" and _family(old) == _family(text):
+    elif KNOWN[old][0].look == "tartan" and _family(old) == _family(text):
         return  # "green tartan wool"
+    elif text in FIGURES and old not in (*GENERIC, *PAINTED):
+        return  # "a brass horn"
+    elif old == "molten":
+        phrase.substance = text  # "molten gold"
+    elif _family(old) == "rust" and _family(text) == "metal":
+        return  # "verdigris copper"
     elif old.endswith("plated"):
         return  # "silver-plated copper"
     elif text in BOARDS or (text in GENERIC and _family(old) == _family(text)):
@@ -240,6 +261,15 @@ def _name(phrase: Phrase, text: str) -> None:
         phrase.substance = text
         if _family(old) != _family(text) or text in PATTERNED:
             phrase.colors = phrase.colors or [old]
+
+
+FIGURES = frozenset([
+    "horn", "antler", "shell", "seashell", "shells", "conch", "bone", "skull", "skulls", "skin", "scales", "feathers", "plumes",
+    "leaf", "leaves", "ivy", "vine", "vines", "comb", "log", "roots", "twigs", "crust", "ribbon", "ribbons", "rope", "cord",
+    "string", "netting", "card", "tusk", "tusks", "tooth", "teeth", "fangs", "claw", "claws", "hoof", "foliage", "fur", "hair",
+    "mane", "grass",
+])  # fmt: skip
+"""Names of stuffs that are shapes of another stuff that stands before them."""
 
 
 def _family(name: str) -> str:
@@ -256,6 +286,11 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             phrases[number] = replace(phrase, thing=thing, region=None, where="")  # "a tire"
     if not phrases:
         return []
+    for one, other in pairwise(phrases):
+        listed = other.join.kind == "and" and one.join.kind in LISTED and one.substance and other.substance
+        if listed and not (one.region or other.region):
+            other.join = one.join  # "crusted with salt and green corrosion"
+            one.much, other.much = 0.6 * one.much, 0.6 * other.much
     phrases = _marked(_checked(_peeled(_painted(phrases))))
     result: list[Phrase] = []
     for number, phrase in enumerate(phrases):
@@ -286,8 +321,11 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             if before.substance:
                 phrase.shows = Phrase(substance=before.substance, boards=before.boards, colors=before.colors)
             result[-1] = phrase
-        elif before and phrase.substance in CLEAR and not (phrase.colors or phrase.region or before.region):
+        elif before and _ground_of(phrase, before):
+            before.colors += phrase.colors  # "terrazzo, white base"
+        elif before and phrase.substance in CLEAR and not (phrase.region or before.region) and _glazes(phrase, before):
             before.finish += phrase.finish or ["glossy"]
+            before.colors += phrase.colors
         elif before and not phrase.says_what and not phrase.region:  # "bronze, polished"
             whole = result[0] if before.region and phrase.join.kind == "comma" else before  # "a boot with a red sole, worn"
             if any(word in SHOWS for word in phrase.weather):
@@ -309,7 +347,24 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             if before and _within(before, phrase):
                 phrase.within = before
             result.append(phrase)
-    return _in_pairs(result)
+    return _in_pairs(_laid(result))
+
+
+LISTED = ("cover", "partly", "spots", "inlay", "stud", "streak", "edge")
+"""Joins that hold for all that "and" goes on with."""
+
+
+def _laid(phrases: list[Phrase]) -> list[Phrase]:
+    """A stuff on a thing of which nothing else is said is what it is made of: "dragon scales on a kite shield"."""
+    if len(phrases) < 2:
+        return phrases
+    first, on, *rest = phrases
+    bare = on.thing and not (on.substance or on.colors or on.unknown or on.animal or on.region)
+    gathers = ONCE.get(first.substance, first.substance) in GATHERS
+    whole = first.substance and not (first.thing or first.region or first.animal or gathers or first.coats)
+    if not (bare and whole and on.join.kind == "on") or KNOWN[first.substance][0].look in FOODS:
+        return phrases
+    return [replace(first, thing=on.thing, size=on.size, weather=[*first.weather, *on.weather]), *rest]
 
 
 def _only_names(phrase: Phrase, before: list[Phrase]) -> bool:
@@ -369,17 +424,28 @@ def _checked(phrases: list[Phrase]) -> list[Phrase]:
             phrase.substance = "fabric"
     if first.where not in SHAPES or first.region is None or not (first.thing or first.substance) or first.animal:
         return phrases
-    pair = len(rest) > 1 and all(p.color_only and not p.region for p in rest[:2]) and rest[1].join.kind == "and"
+    pair = len(rest) > 1 and all(_hue_alone(p) for p in rest[:2]) and rest[1].join.kind in ("and", "on")
+    if pair and rest[1].join.kind == "on":
+        rest[0], rest[1] = rest[1], replace(rest[0], join=Join("and"))  # "houndstooth, black on ivory"
+        rest[0] = replace(rest[0], join=Join("comma"), colors=rest[0].colors or [rest[0].substance], substance="")
     if pair and not first.colors and rest[0].join.kind in ("comma", "in"):
         one, other, rest = rest[0].colors, rest[1].colors, rest[2:]
     elif first.where in ("chequered", "checkered") and not (rest or first.colors or first.metal):
         one, other = ["black"], ["white"]
     elif first.where in CLOTHS and not (rest and rest[0].color_only):
         one, other = first.colors or [CLOTHS[first.where]], ["white"]
+    elif first.colors and rest and rest[0].color_only and rest[0].join.kind == "and" and not rest[0].region:
+        one, other, rest = first.colors, rest[0].colors, rest[1:]  # "chevron rug, mustard and grey"
     else:
         return phrases
     marks = Phrase(Join("with"), first.substance, first.boards, other, region=first.region, where=first.where)
     return [replace(first, colors=one, region=None, where="", placed=False), marks, *rest]
+
+
+def _hue_alone(phrase: Phrase) -> bool:
+    """Whether a phrase is a colour and nothing else: "ivory" is one, too."""
+    named = phrase.substance in COLORS and not (phrase.colors or phrase.unknown or phrase.thing)
+    return (phrase.color_only or named) and not phrase.region
 
 
 def _plaid(phrase: Phrase) -> bool:
@@ -431,6 +497,9 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
     """An animal's marks in colours that words name, on a ground of its own stuff: "zebra stripes, pink and purple"."""
     first, *rest = phrases
     after = rest[0] if rest else Phrase()
+    bare = after.join.kind == "on" and after.substance and not (after.colors or after.region)
+    if first.animal and not first.substance and bare:
+        return [replace(first, substance=after.substance, region=None, where=""), *rest[1:]]  # "zebra striped, in cowhide"
     if first.color_only and after.animal and after.join.kind == "and":
         first.substance = _coat_of(after.animal)  # "pink and purple leopard print"
     elif first.animal and any(map(is_hue, first.colors)) and after.color_only and after.join.kind == "and" and not after.region:
@@ -479,6 +548,18 @@ ALONE = ("countertop", "tabletop", "table top", "desktop", "shelf", "door", "win
 CLEAR = frozenset(["glaze", "varnish", "glazed", "clear coat", "clearcoat"])
 """Coats that one sees through."""
 
+
+def _ground_of(phrase: Phrase, before: Phrase) -> bool:
+    """Whether a phrase names the colour of what the chips of a stuff lie in."""
+    mixed = bool(before.substance) and KNOWN[before.substance][0].look == "terrazzo" and not before.colors
+    return mixed and phrase.color_only and phrase.where in ("base", "ground", "background")
+
+
+def _glazes(glaze: Phrase, before: Phrase) -> bool:
+    """Whether a clear coat is that of the whole: one without colour, or of one colour on what has none."""
+    return not glaze.colors or (not before.colors and all(word in COLORS for word in glaze.colors if is_hue(word)))
+
+
 WEARS = {
     **dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained",
     **dict.fromkeys(("streaks", "drips", "water stains", "rain streaks", "water streaks", "water marks"), "streaky"),
@@ -501,18 +582,21 @@ def _add(words: list[str], more: list[str]) -> None:
 
 def _heads(phrase: Phrase, after: Phrase) -> bool:
     """Whether a part stands before a comma or colon and its stuff after: "trim: copper"."""
-    return not phrase.says_what and bool(phrase.region) and after.join.kind == "comma" and after.says_what and not after.region
+    joined = after.join.kind in ("comma", "cover", "paint", "partly")  # "whose grip is wrapped in red leather"
+    return not phrase.says_what and bool(phrase.region) and joined and after.says_what and not after.region
 
 
 def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     """Whether a phrase after a comma says more of the one before: "a jar, glossy blue"; "oak, brown"."""
-    if phrase.region or phrase.thing or (after and after.region and after.join.kind == "and" and after.where not in PARTS):
+    paired = after and after.region and after.join.kind == "and" and after.where not in PARTS
+    if phrase.region or phrase.thing or (phrase.part and not phrase.substance) or paired:
         return False
     bare = before.thing and not (before.substance or before.colors or before.unknown)
     dull = bool(before.substance) and not before.metal
     hue = phrase.color_only or (dull and phrase.substance in COLORS and not (phrase.colors or phrase.unknown or phrase.finish))
     unsaid = hue and bool(before.substance or before.unknown) and not before.colors and not before.region
-    return bool(bare and (phrase.says_what)) or unsaid
+    gathers = ONCE.get(phrase.substance, phrase.substance) in GATHERS
+    return bool(bare and phrase.says_what and not gathers) or unsaid
 
 
 def _describe(before: Phrase, phrase: Phrase) -> None:

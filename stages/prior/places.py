@@ -31,11 +31,12 @@ PARTS = _table(
     ("lower body", Region("below", 0.5)), ("upper body", Region("above", 0.5)),
     ("label, sticker, decal, logo, emblem, badge", Region("front", 0.12)),
     ("base, bottom, underside, lower half, lower part, bottom half, lower, lower section", Region("below", 0.5)),
-    ("sole, soles, outsole, tread, treads, rubber sole", Region("below", 0.08)),
+    ("sole, soles, outsole, tread, treads", Region("below", 0.08)),
     ("pedestal, plinth, stand, socle, foundation, foundations, hem, skirting", Region("below", 0.2)),
     ("foot, feet, legs, leg, paws, hooves, castors, casters, wheels, tyres, tires, stem, stalk", Region("below", 0.3)),
     ("top, upper half, upper part, top half, upper, upper section", Region("above", 0.5)),
-    ("lid, cap, cover, roof, hood, dome, crown, crest, hat, bonnet, lids, stopper, hair, comb, mane, "
+    ("roof, roofing, rooftop", Region("above", 0.42)),
+    ("lid, cap, cover, hood, dome, crown, crest, hat, bonnet, lids, stopper, hair, comb, mane, "
      "ceiling", Region("above", 0.22)),
     ("lower third, bottom third, lowest third", Region("below", 0.33)),
     ("lower quarter, bottom quarter", Region("below", 0.25)),
@@ -64,9 +65,15 @@ PARTS = _table(
 )
 """Parts of things that name a region."""
 
-TABLES = frozenset(["table", "desk", "bench", "stool", "chair", "nightstand", "dresser", "cabinet", "sideboard"])
-TABLE_PARTS = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat": Region("up", 0.3)}
-"""Parts of furniture, which lie elsewhere than in other things."""
+_TABLE = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat": Region("up", 0.3)}
+_CAR = {
+    "roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3), "hood": Region("front", 0.3),
+}
+PARTS_OF = {
+    **dict.fromkeys(("table", "desk", "bench", "stool", "chair", "nightstand", "dresser", "cabinet", "sideboard"), _TABLE),
+    **dict.fromkeys(("car", "sports car", "race car", "pickup truck", "truck", "van", "bus", "taxi", "tram", "train"), _CAR),
+}
+"""Things whose parts lie elsewhere than those of others."""
 
 SHAPES = _table(
     ("zigzag, zigzags, chevrons, stripes, stripe, striped, vertical stripes, diagonal stripes, "
@@ -83,7 +90,8 @@ SHAPES = _table(
          "check pattern, chessboard pattern, gingham, houndstooth, harlequin, argyle, tattersall, buffalo check, chequerboard, "
          "checker, chequers",
      Region("checks", 0.5, 0.12)),
-    ("water stains, patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, mottled, splashes, "
+    ("water stains, patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, swirl, swirled, swirly, "
+         "mottled, splashes, "
          "splatters, splattered, "
      "spattered, splashed, patched, blotchy, smudges, smears, puddles, flames, graffiti, spills",
      Region("patches", 0.35, 0.16, 0.7)),
@@ -107,10 +115,10 @@ ANIMALS = {
     "panda": ("#ece8e0", "#161514", Region("patches", 0.4, 0.4, 0.1)),
     "ladybird": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
     "ladybug": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
-    "camouflage": ("#5a5c3a", "#3a3324", Region("patches", 0.45, 0.2, 0.2)),
-    "camo": ("#5a5c3a", "#3a3324", Region("patches", 0.45, 0.2, 0.2)),
+    "camouflage": ("#5a5c3a", "#3a3324 #8c7c54 #1b1a16", Region("patches", 0.4, 0.2, 0.2)),
+    "camo": ("#5a5c3a", "#3a3324 #8c7c54 #1b1a16", Region("patches", 0.4, 0.2, 0.2)),
 }
-"""Coats that everybody knows: ground, marks, and how these lie."""
+"""Coats that everybody knows: ground, marks of one colour or of several, and how these lie."""
 
 GATHERS = {
     "moss": Region("crevices", 0.4, 0.18, 1.0), "rust": Region("chips", 0.4, 0.12, 1.0),
@@ -118,7 +126,7 @@ GATHERS = {
     "mud": Region("below", 0.25, 0.15, 1.0), "soil": Region("crevices", 0.35, 0.15, 1.0),
     "snow": Region("up", 0.42, 0.12, 0.4, 0.02),
     "verdigris": Region("crevices", 0.35, 0.14, 1.0), "frost": Region("edges", 0.35, 0.1, 1.0),
-    "ice": Region("up", 0.3, 0.15, 0.6),
+    "ice": Region("up", 0.3, 0.15, 0.6), "icicles": Region("edges", 0.2, 0.1, 0.8),
     "lichen": Region("patches", 0.25, 0.1, 1.0), "gold leaf": Region("patches", 0.5, 0.25, 0.8),
     "ash": Region("up", 0.45, 0.2, 1.0, 0.12),
     "soot": Region("patches", 0.4, 0.3, 1.0, 0.5), "dust": Region("up", 0.5, 0.2, 1.0, 0.2),
@@ -173,9 +181,11 @@ WEATHER = _weather(
     ("cracked, crazed, fissured, fractured, cracking", Weather("grime", Region("veins", 0.04, 0.2, 0.3), -2e-4, 0.85)),
     ("scratched, scuffed, scraped", Weather("", Region("scratches", 0.05, 0.1, 0.9), -5e-5)),
     ("mossy, overgrown", Weather("moss", Region("crevices", 0.42, 0.18, 1.0), 3e-3)),
+    ("moldy, mouldy, mildewed", Weather("mildew", Region("patches", 0.35, 0.14, 1.0), 0.0, 0.85)),
     ("bloody, bloodstained, blood-stained", Weather("blood", Region("patches", 0.25, 0.18, 0.9))),
     ("dusty, sandy", Weather("dust", Region("up", 0.5, 0.2, 1.0, 0.2), 5e-5, 0.75)),
-    ("frosty, frosted over, icy", Weather("frost", Region("edges", 0.35, 0.1, 1.0), 1e-3, 0.85)),
+    ("frosty, frosted over, icy, iced over, frozen over, iced, frozen",
+     Weather("frost", Region("edges", 0.35, 0.1, 1.0), 1e-3, 0.85)),
     ("snowy", Weather("snow", Region("up", 0.42, 0.12, 0.4, 0.02), 8e-3)),
 )
 """Words of wear and weather, from below: what lies lowest first."""
@@ -222,6 +232,7 @@ JOINED = {
     "streak": SHAPES["streaks"], "vein": SHAPES["veins"], "cap": Region("up", 0.4, 0.12, 0.4), "rim": PARTS["rim"],
     "tip": PARTS["tip"], "sole": PARTS["sole"], "handle": PARTS["handle"], "line": PARTS["lining"], "stud": SHAPES["studs"],
     "all": Region("all", 1.0), "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5),
+    "swirl": Region("patches", 0.45, 0.25, 0.3),
     "bottom": PARTS["base"], "legs": PARTS["legs"], "seat": PARTS["seat"], "paint": Region("all", 1.0),
 }  # fmt: skip
 """Where a phrase lies that only its joining word tells."""

@@ -18,7 +18,7 @@ from stages.material.library import Library
 from stages.material.look import from_oklab, to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Part, Recipe
 from stages.material.substances import LOOKS, METRES
-from stages.prior.colors import CHANGES, COLORS, LEANINGS, changed, rgb
+from stages.prior.colors import CHANGES, COLORS, LEANINGS, TREATMENTS, changed, rgb
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Join, Phrase, is_hue, split
@@ -33,6 +33,7 @@ from stages.prior.places import (
     LAYERED,
     ONCE,
     PARTS,
+    PARTS_OF,
     PEELED,
     PEELS,
     POROUS,
@@ -41,8 +42,6 @@ from stages.prior.places import (
     SHELLED,
     SOAK,
     SOAKED,
-    TABLE_PARTS,
-    TABLES,
     WEATHER,
     WET,
     WHOLE,
@@ -137,8 +136,9 @@ class Reading:
             ground, marks, region = ANIMALS[base.animal]
             if not base.colors:
                 layers = [Layer(replace(coat, color=_triple(rgb(ground))))]
-            marked = replace(coat, color=_triple(rgb(marks)), said=f"{base.animal} marks")
-            layers.append(Layer(marked, (region.mask(base.animal),)))
+            for k, mark in enumerate(marks.split()):
+                marked = replace(coat, color=_triple(rgb(mark)), said=f"{base.animal} marks")
+                layers.append(Layer(marked, (_scaled(region, 0.7**k).mask(base.animal),)))
         return [*layers, *self._weather(base)]
 
     def _over(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
@@ -154,7 +154,8 @@ class Reading:
             return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (), beneath)]
         if phrase.animal:
             _, marks, region = ANIMALS[phrase.animal]
-            marked = replace(beneath, color=_color(phrase) if phrase.colors else _triple(rgb(marks)), said=_said(phrase))
+            mark = _color(phrase) if phrase.colors else _triple(rgb(marks.split()[0]))
+            marked = replace(beneath, color=mark, said=_said(phrase))
             return [Layer(marked, (region.mask(phrase.animal),))]
         mask = self._region(phrase).mask(phrase.where)
         if phrase.within and phrase.within.region:
@@ -198,6 +199,8 @@ class Reading:
             return SHAPES["studs"]
         if phrase.substance in ROOFING and phrase.join.kind in ("", *BESIDE):
             return PARTS["roof"]
+        if phrase.part and phrase.join.kind == "on":
+            return PARTS["stand"]  # "a cannon on a wooden carriage"
         if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
             return DETAILS
         return JOINED.get(phrase.join.kind, JOINED["with"])
@@ -209,6 +212,10 @@ class Reading:
             phrase = replace(phrase, unknown=[])  # "a deere tractor"
         if phrase.unknown and (not phrase.substance or phrase.substance in GENERIC):
             return self._unknown(phrase)
+        if phrase.substance and _family(phrase) == "wood" and BURNT & set(phrase.weather) and not phrase.amount_of(BURNT):
+            rest = [word for word in phrase.weather if word not in BURNT]
+            coal = self._coat(replace(phrase, substance="charred wood", weather=rest))
+            return replace(coal, said=f"charred {phrase.substance}")
         if phrase.substance:
             usual = split(made)[0] if made else Phrase()
             kin = phrase.substance in GENERIC and bool(usual.substance) and _family(usual) == _family(phrase)
@@ -236,7 +243,8 @@ class Reading:
             return replace(beneath, color=_color(phrase), look=look, metallic=metallic, roughness=rough, said=_said(phrase))
         if phrase.animal:
             name = "glossy plastic" if phrase.animal in SHELLED else "cotton" if phrase.animal in PRINTED else "fur"
-            return self._of(stuff(name, False), phrase)
+            hard = phrase.animal in PRINTED and made and _family(split(made)[0]) in ("metal", "plastic", "paint")
+            return self._of(stuff("paint" if hard else name, False), phrase)
         weathers = [WEATHER[word].stuff for word in _weathers(phrase) if WEATHER[word].stuff]
         name = "paint" if phrase.colors else weathers[0] if weathers else UNSAID
         if weathers and not phrase.colors:
@@ -249,7 +257,9 @@ class Reading:
         roughness = _roughness(phrase, bool(wanted.metallic)) or wanted.roughness
         for word in phrase.weather:
             roughness *= WET.get(word, 1.0)
-        color = _faded(np.array(_described(wanted, _color(phrase, wanted.color))), phrase)
+        named = _color(phrase, wanted.color)
+        treated = any(word in TREATMENTS for word in phrase.colors)
+        color = _faded(np.array(named if treated else _described(wanted, named)), phrase)
         if wanted.roughness > POROUS and not wanted.metallic and any(word in SOAKED for word in phrase.weather):
             color = _triple(np.array(color) * SOAK)
         look = look_of(wanted, phrase.finish, self._looks)
@@ -353,12 +363,16 @@ class Reading:
         if under and phrase.coats:
             return under
         own = self._coat(phrase)
+        if own.look == "enamel":
+            return self._named("black iron")
         family = KNOWN[phrase.substance][0].family if phrase.substance else ""
         if family == "paint" or own.look in ("paint", "car paint", "painted wood"):
             made = split(OBJECTS[phrase.thing].made)[0] if phrase.thing else Phrase()
             if made.substance and not made.coats:
                 return self._coat(made)
-            return self._named("pine" if "wood" in phrase.substance + made.substance or own.look == "painted wood" else "steel")
+            wooden = "wood" in phrase.substance + made.substance or own.look == "painted wood"
+            grey = any(word in FADED for word in phrase.weather)
+            return self._named(("weathered wood" if grey else "pine") if wooden else "steel")
         return _worn(own)
 
     def _sized(self, coat: Coat) -> Coat:
@@ -404,6 +418,8 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
             whole = replace(frame, thing=first.thing, region=None, where="", join=first.join)
             return whole, [p for p in over if p is not frame]
     body = next((k for k, p in enumerate(over) if p.region and p.region.kind == "all" and p.says_what), None)
+    if body is not None and over[body].color_only and first.substance and not (first.colors or first.region):
+        first, over, body = replace(first, colors=over[body].colors), [*over[:body], *over[body + 1 :]], None
     if body is not None:
         thing = first.thing
         alone = bool(thing) and not (first.substance or first.colors or first.unknown)
@@ -412,16 +428,25 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
         first, over = over[body], [*([] if alone else [first]), *over[:body], *over[body + 1 :]]
         first = replace(first, thing=first.thing or (thing if alone else ""))
     told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
-    bare = bool(first.thing) and not (told or first.substance or first.colors or first.unknown or first.animal)
-    if bare and over and over[0].region is None and over[0].says_what and _covers(over[0]):
-        first, over = replace(over[0], thing=first.thing, join=Join(""), weather=[*first.weather, *over[0].weather]), over[1:]
+    bare = bool(first.thing) and not (told or first.substance or first.unknown or first.animal)
+    if bare:
+        first, over = _of_what(first, over)
     if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
         over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
     region, other = (over[0].region if over else None), first.region
     if region and other and over[0].where in ("above", "below") and {region.kind, other.kind} == {"above", "below"}:
         over[0] = replace(over[0], region=region._replace(share=1 - other.share))
-    if first.thing in TABLES:
-        over = [replace(p, region=TABLE_PARTS.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
+    for phrase in over:
+        shown = phrase.shows
+        if not (shown and shown.substance and set(phrase.weather) & PEELS) or phrase.region:
+            continue
+        usual = split(OBJECTS[first.thing].made)[0] if first.thing else Phrase()
+        own = first.substance or usual.substance
+        if own and not first.colors and _family(shown) == KNOWN[own][0].family:
+            first = replace(first, substance=shown.substance, colors=shown.colors)  # "wooden, peeling paint showing grey oak"
+    if first.thing in PARTS_OF:
+        places = PARTS_OF[first.thing]
+        over = [replace(p, region=places.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
     return first, over
 
 
@@ -478,6 +503,40 @@ def _covers(phrase: Phrase) -> bool:
     return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
 
 
+def _of_what(thing: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
+    """A thing with the stuff that is said after it: "armchair upholstered in velvet", "a gnome in the snow, terracotta"."""
+    beneath = [p.join.kind in ("on", "over") and p.join.beneath and bool(p.substance or p.unknown) for p in over]
+    ground = beneath.index(True) if any(beneath) else 0
+    laid = (p.substance in GATHERS or p.coats or p.part or p.where in SHAPES for p in over[:ground])
+    if ground and not over[ground].region and all(laid):
+        said = replace(over[ground], thing=thing.thing, join=Join(""), weather=[*thing.weather, *over[ground].weather])
+        paints = [replace(p, join=Join("over")) for p in over[:ground] if p.coats]
+        others = [p for p in over[:ground] if not p.coats]
+        return said, [*paints, *others, *over[ground + 1 :]]  # "a mailbox, icicles and frost on blue paint"
+    for k, phrase in enumerate(over):
+        named = phrase.join.kind == "comma" and bool(phrase.substance) and not phrase.part
+        if k and not (over[k - 1].substance in GATHERS or over[k - 1].weather):
+            break
+        whole = _covers(phrase) if named or not k else False
+        elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
+        if elsewhere or not (whole or (not k and _upholsters(phrase, thing))):
+            continue
+        if thing.colors and not named:
+            continue
+        dyed = phrase.colors or phrase.coats or any(word in COLORS for word in phrase.substance.split())
+        colors = phrase.colors if dyed else thing.colors  # "a red jar, porcelain"
+        weather = [*thing.weather, *phrase.weather]
+        said = replace(phrase, thing=thing.thing, join=Join(""), colors=colors, weather=weather)
+        return said, [*over[:k], *over[k + 1 :]]
+    return thing, over
+
+
+def _upholsters(phrase: Phrase, thing: Phrase) -> bool:
+    """Whether what a thing is upholstered in is all that one sees of it: of an armchair, not of a chair."""
+    usual = split(OBJECTS[thing.thing].made)[0]
+    return phrase.join.kind == "seat" and bool(usual.substance) and _family(usual) in ("fabric", "leather")
+
+
 def _usual_size(phrases: list[Phrase]) -> float | None:
     """Metres of the thing that is named first, if any, as large as words say."""
     things = [OBJECTS[phrase.thing] for phrase in phrases if phrase.thing]
@@ -492,8 +551,14 @@ def _once(layers: list[Layer]) -> list[Layer]:
     return list({(layer.coat.look, layer.coat.color, layer.masks): layer for layer in reversed(layers)}.values())[::-1]
 
 
+BURNT = frozenset(["charred", "burnt", "burned"])
+"""Words that say of wood that it is charcoal."""
+
+
 def _corroded(name: str, phrase: Phrase) -> str:
     """What weather leaves on a phrase's stuff: rust on iron, verdigris on copper."""
+    if name == "rust" and phrase.substance and KNOWN[phrase.substance][0].look == "verdigris":
+        return "verdigris"
     if name not in ("rust", "verdigris") or not phrase.substance or not KNOWN[phrase.substance][0].metallic:
         return name
     return CORRODES.get(KNOWN[phrase.substance][0].look.split(" ")[-1], name)
@@ -502,8 +567,9 @@ def _corroded(name: str, phrase: Phrase) -> str:
 def _weathers(phrase: Phrase) -> list[str]:
     """The words of weather of a phrase from below, one for each thing that weather does."""
     told: dict[tuple[str, str], str] = {}
+    charred = bool(phrase.substance) and _family(phrase) == "wood" and not phrase.amount_of(BURNT)
     for word, weather in WEATHER.items():
-        if word in phrase.weather:
+        if word in phrase.weather and not (charred and word in BURNT):
             told.setdefault((weather.stuff, weather.region.kind), word)
     if sum(place == "crevices" for _, place in told) > 1:
         told.pop(("grime", "crevices"), None)  # what else lies in crevices hides it

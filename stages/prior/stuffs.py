@@ -76,7 +76,9 @@ PAINTABLE = frozenset(words("ceramic, plastic, paint, fabric, leather, paper, to
 
 
 def _stuff(name: str, s: Substance) -> Stuff:
-    red, green, blue = np.mean([rgb(text) for text in s.colors], 0).tolist()
+    anchors = [rgb(text) for text in s.colors]
+    plainest = min(anchors, key=lambda color: float(np.ptp(color)))
+    red, green, blue = (plainest if s.paintable else np.mean(anchors, 0)).tolist()  # of any colour: none that stands out
     look = LOOK_OF.get(name, name)
     return Stuff(name, s.family, look, (red, green, blue), sum(s.roughness) / 2, s.metallic, s.paintable)
 

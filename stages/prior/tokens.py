@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS, rows, words
-from stages.prior.places import ANIMALS, FADED, PARTS, SHAPES, WEATHER, WET
+from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET
 from stages.prior.sizes import TIMES
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF
 
@@ -28,7 +28,10 @@ FILLER = words(
     "coat of, coats of, coating of, splash of, set of, pair of, sheet of, slab of, lump of, was, were, be, for, as, "
     "tint, hue, tone, sheen, shine, glow, glowing, like, more, ware, grain, look, looking, effect, imitation, tones, shade of, "
     "shades of, unpainted, untreated, unvarnished, uncoated, bare, raw, plain, solid, pure, real, genuine, only, just, "
-    "hand-painted, handmade, hand-made, handcrafted, hand-carved, carved, stylized, stylised, low poly, lowpoly, high poly, "
+    "whatsoever, at all, should, should be, would, could, to be, i, d, id, want, please, make, give, left out, left outside, "
+    "hand-thrown, whole, overall, throughout, somehow, found, recovered, within, "
+    "from within, still, freshly, fresh, cluster of, hand-painted, "
+    "handmade, hand-made, handcrafted, hand-carved, carved, stylized, stylised, low poly, lowpoly, high poly, "
     "cartoon, game asset, game ready, game-ready, game engine, unreal engine, unity, octane render, octane, blender, "
     "cycles render, vray, substance painter, substance, trending on artstation, artstation, best quality, ultra detailed, "
     "hyper detailed, hyperrealistic, ultra realistic, intricate details, intricate, ornate, cinematic lighting, "
@@ -37,7 +40,7 @@ FILLER = words(
     "baroque, tileable, seamless, tiling, texture variation, roughness variation, color variation, variation, award winning, "
     "professional, elegant, close up, close-up, macro, hd, uhd, dslr, raw photo, hdr, upright, woven, stitched, crushed, "
     "crumpled, dented in, ripped, torn, frayed, "
-    "wrinkled, after, down the sides, down the side, down the walls, down its sides, down, slats, slat"
+    "wrinkled, down the sides, down the side, down the walls, down its sides, down, slats, slat"
 )
 """Words that say nothing of a material."""
 
@@ -82,8 +85,10 @@ def _joins(kind: str, text: str, beneath: bool = False) -> dict[str, Join]:
 
 JOINS = {
     **_joins("with", "with, plus, has, have, having, featuring, including, but with, but, complete with, whose, where, while, "
+             "after, "
              "and whose, adorned with, decorated with, embellished with, fitted with, equipped with, accented with, "
-             "accented by, with accents of"),
+             "accented by, with accents of, as well as, along with, together with, set off by, set off with, "
+             "finished off with"),
     **_joins("and", "and"),
     **_joins("paint", "painted in, painted with, lacquered in, lacquered with, enamelled in, enameled in, finished in, "
              "finished with, sprayed in, sprayed with, powder-coated in, powder coated in, rendered in, glazed in, "
@@ -91,7 +96,8 @@ JOINS = {
     **_joins("seat", "upholstered in, upholstered with, padded with, cushioned with"),
     **_joins("cover", "covered in, covered with, covered by, coated in, coated with, overgrown with, overgrown by, "
              "smothered in, "
-             "caked in, caked with, under a layer of, dusted with, dusted in, encrusted with, topped by a layer of, clad in, "
+             "caked in, caked with, crusted in, crusted with, sheathed in, encased in, "
+             "under a layer of, dusted with, dusted in, encrusted with, topped by a layer of, clad in, "
              "blanketed in, buried in, wrapped in, dipped in, plated in, plated with, draped in, drenched in, "
              "covered over with"),
     **_joins("partly", "partly covered in, partly covered with, partially covered in, partially covered with, stained with, "
@@ -99,7 +105,9 @@ JOINS = {
              "patched with"),
     **_joins("spots", "speckled with, dotted with, flecked with, spotted with, sprinkled with"),
     **_joins("stud", "studded with, riveted with"), **_joins("inlay", "inlaid with, inlaid in, veined with, shot through with, "
-             "repaired with, repaired in, mended with, mended in"),
+             "repaired with, repaired in, mended with, mended in, laced with"),
+    **_joins("swirl", "marbled with, swirled with, swirling with, swirled into, swirling into, swirling through, "
+             "swirled through"),
     **_joins("edge", "edged with, trimmed with, trimmed in, edged in, bordered with, bordered by, framed in, framed by, "
              "framed with"),
     **_joins("rim", "rimmed with, rimmed in"), **_joins("cap", "capped with, capped in"),
@@ -117,14 +125,15 @@ JOINS = {
         "chipped to, rubbed down to, "
              "worn through to, that shows, that reveals, worn to reveal, chipped away to reveal, scraped down to, "
              "worn to, sanded to, rubbed to, stripped to, scraped to, peeling to reveal, flaking to reveal, to reveal, "
-             "to expose, "
+             "to expose, to show, to uncover, uncovering, baring, to bare, letting show, "
              "peeled back to"),
     **_joins("through", "showing through, shining through, visible through, peeking through, visible under, "
              "visible beneath, shows through, peeks through, shines through, exposed under, "
              "showing under, showing beneath", True),
     **_joins("fade", "fading into, fading to, fades into, fades to, blending into, blending to, turning into, turning to, "
              "turns into, turns to, becoming, becomes, "
-             "transitioning to, transitioning into, gradient to, merging into, melting into, dissolving into, changing into"),
+             "transitioning to, transitioning into, gradient to, "
+             "shading into, shading to, graduating to, ombre to, merging into, melting into, dissolving into, changing into"),
     **_joins("on", "on, onto, atop, upon, across, out of, growing on, growing out of, growing from, emerging from, mounted on, "
              "standing on, sitting on, resting on, lying on, painted on, painted onto, printed on, splashed on", True),
              **_joins("over", "over, on top of, applied to, laid over", True),
@@ -147,17 +156,20 @@ POSTFIX = {
 }  # fmt: skip
 """Words after what lies on the thing that follows ("moss-covered stone"), and how it does."""
 
+PAINTED = ("painted", "lacquer", "enamel", "whitewash", "gilded")
+"""What is said of a stuff after its name: "iron painted black"."""
+
 DYED = ("colored", "coloured", "tinted", "dyed", "toned", "hued", "color", "colour")
 """Words that make a substance's name that of a colour."""
 
 
 class Token(NamedTuple):
-    """kind: as in `_table`. text: as the table spells it. value: of the table. article: whether "a" or "an" stood before it."""
+    """kind: as in `_table`. text: as the table spells it. value: of the table. article: "a" or "the" that stood before it."""
 
     kind: str
     text: str
     value: Any = None
-    article: bool = False
+    article: str = ""
 
 
 def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Container[str] = ()) -> list[Token]:
@@ -165,9 +177,12 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     prompt = re.sub(r"\s[-–—]+\s|[–—]", " , ", prompt)  # "rust - a ship"
     plain = unicodedata.normalize("NFKD", prompt.lower()).encode("ascii", "ignore").decode()
     plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
+    plain = plain.replace("'s ", " ")
+    for simile, meant in SIMILES:
+        plain = re.sub(simile, meant, plain)
     heard = re.findall(r"#[0-9a-f]{6}\b|[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
     found: list[Token] = []
-    at, article = 0, False
+    at, article = 0, ""
     while at < len(heard):
         if heard[at][0] == "#":
             found.append(Token("color", heard[at]))
@@ -187,9 +202,54 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
             found += [part._replace(article=article) for part in _explained(heard[at], explained)]
         elif token.kind != "filler":
             found.append(token._replace(article=article))
-        article = heard[at] in ("a", "an")
+        article = ARTICLES.get(heard[at], "")
         at += length
-    return _resolved(_denied(found))
+    return _resolved(_indoors(_dyed(_denied(found))))
+
+
+ARTICLES = {"a": "a", "an": "a", "the": "the"}
+
+NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on )"
+SIMILES = (
+    (r"\bas (?!well|soon|long|much|many|far)([a-z]+(?:-[a-z]+)?) as " + NOUNS, r"\1"),  # "as black as a raven's wing"
+    (r"\b(?:in )?(?:the )?colou?r of " + NOUNS, r"\1 coloured"),  # "the colour of honey"
+    (r"\bwith (?:an? |the )?([a-z -]+?) (?:finish|coating|paint job|paintwork|surface|texture|look)\b", r"finished in \1"),
+)
+"""What says in a roundabout way what an adjective says."""
+
+
+def _dyed(found: list[Token]) -> list[Token]:
+    """Names of substances whose colour alone is meant, as colours: "honey coloured glass"."""
+    kept: list[Token] = []
+    for token in found:
+        if token.kind != "dyed":
+            kept.append(token)
+        elif kept and kept[-1].kind == "substance":
+            kept[-1] = Token("color", kept[-1].text)
+    return kept
+
+
+def _indoors(found: list[Token]) -> list[Token]:
+    """What is left without where a thing is or was: "fresh out of the oven". Snow and mud in which it lies lie on it."""
+    kept: list[Token] = []
+    at = 0
+    while at < len(found):
+        token, after = found[at], found[at + 1] if at + 1 < len(found) else Token("end", "")
+        there = ("in", "into", "out of", "on") if any(t.kind == "thing" for t in kept) else ("in", "into", "out of")
+        place = token.kind == "join" and token.text in there and after.article == "the" and bool(kept)
+        if place and after.kind in ("thing", "substance") and not any(t.kind == "part" for t in _run(found[at + 1 :])):
+            if after.text in GATHERS and token.text != "on":
+                kept.append(Token("join", "with", JOINS["with"]))
+            else:
+                at += 1
+        elif not (token.text == "out of" and kept and kept[-1].kind == "thing"):  # "a teapot out of amber"
+            kept.append(token)
+        at += 1
+    return kept
+
+
+GLOSS = 0.3
+"""Roughness below which a finish is one of gloss."""
 
 
 def _alone(word: str) -> Token | None:
@@ -199,9 +259,10 @@ def _alone(word: str) -> Token | None:
 
 
 def _denied(found: list[Token]) -> list[Token]:
-    """What is left without that which words say is not there: "iron, no rust"; "silver, not gold"."""
+    """What is left without that which words say is not there: "iron, no rust"; "silver, not gold"; what has no gloss is
+    matte. """
     kept: list[Token] = []
-    denying = fresh = spare = False
+    denying = denied = fresh = spare = False
     for token in found:
         if token.kind == "denial":
             denying = fresh = True
@@ -209,10 +270,14 @@ def _denied(found: list[Token]) -> list[Token]:
         elif token.kind in ("join", "comma", "half") and token.text != "of":
             if denying and not fresh and token.kind == "join" and token.text in SPARED:
                 continue
-            denying = False
-            kept.append(token)
+            instead = (denying or denied) and token.text == "but"
+            denying, denied = False, denying
+            kept.append(Token("comma", ",") if instead else token)  # "not metal, but bone"
         elif not denying:
+            denied = False
             kept.append(token)
+        elif token.kind == "finish" and sum(FINISHES.get(token.text, (1, 1))) < 2 * GLOSS:
+            kept.append(Token("finish", "matte"))
         elif spare:
             denying = False  # "darker than charcoal | rubber"
         fresh = False if token.kind != "denial" else fresh
@@ -253,10 +318,15 @@ def _respelt(word: str, explained: Container[str], real: Container[str]) -> list
             return [first, *([] if second in ENDINGS else [second])]
     if any(one in real for one in (word, *singulars(word))):
         return []
-    return next(([slip] for slip in _slips(word) if _worth(slip)), [])
+    return next(([slip] for slip in _slips(word) if slip[:1] == word[0] and _worth(slip) and not _derived(word, slip)), [])
 
 
-LEAST_LETTERS = 5
+def _derived(word: str, slip: str) -> bool:
+    """Whether a word is no slip but made of another: what was done to a thing, "honed"; what it is like, "glassy"."""
+    return (word.endswith("ed") and not slip.endswith("ed")) or word == f"{slip}y"
+
+
+LEAST_LETTERS = 6
 """Letters of the shortest word that is taken for a slip of the pen."""
 
 
@@ -328,14 +398,18 @@ def _resolved(found: list[Token]) -> list[Token]:
 
 
 FOODS = frozenset(["bread", "cheese", "chocolate", "salt", "meat", "honeycomb", "honey"])
-"""Looks of what is kept in things of other stuffs."""
+"""Looks of what is eaten."""
+
+HELD = FOODS | {"grass", "sand", "fine sand", "soil", "coal", "charcoal", "snow", "ice", "ash", "dust", "gravel", "leaves",
+                "bark", "newspaper", "oil", "seashell"}  # fmt: skip
+"""Looks of what things of other stuffs are for: "a plastic lawn chair", "a steel oil drum"."""
 
 
 def _holds(token: Token, before: list[Token], after: list[Token]) -> bool:
     """Whether a name only says what a thing is for, whose own stuff stands before: "enamel bread bin"."""
-    food = token.kind == "substance" and (KNOWN[token.text][0].look in FOODS or token.text in FOODS)
+    food = token.kind == "substance" and (KNOWN[token.text][0].look in HELD or token.text in HELD)
     named = bool(after) and after[0].kind in ("thing", "unknown", "name")
-    return food and named and any(t.kind == "substance" for t in _run(reversed(before)))
+    return food and named and any(t.kind == "substance" and t.text not in PAINTED for t in _run(reversed(before)))
 
 
 def _shades(token: Token, after: list[Token]) -> bool:
@@ -379,6 +453,7 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("postfix", POSTFIX)
     enter("join", JOINS)
     enter("part", {f"{word} {place}": PARTS[place] for word in PLACED for place in PARTS} | {"on top of it": PARTS["top"]})
+    enter("filler", [f"{word} {place}" for word in ("from the", "from its", "down from the") for place in PARTS])
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
     for known, *others in rows("spellings.tsv"):
         table |= {other: table[known] for other in words(others[0]) if other not in table}

@@ -73,7 +73,7 @@ IDENTIFIED = (
 
 PROMPTS = (
     *IDENTIFIED,
-    _seen("silver", "silver"), _seen("brass", "brass"), _seen("cast bronze", "bronze"), _seen("wrought iron", "iron"),
+    _seen("silver", "silver"), _seen("brass", "brass"), _seen("cast bronze", "bronze"), _seen("wrought iron", "wrought iron"),
     _seen("stainless steel", "steel"), _seen("copper", "copper"), _seen("titanium", "titanium"),
     _seen("aluminium", "aluminium"), _seen("polished brass", "brass", finish="polished"),
     _seen("brushed steel", "steel", finish="brushed"), _seen("walnut wood", "walnut"), _seen("pine wood", "pine"),

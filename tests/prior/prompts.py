@@ -29,7 +29,7 @@ green glass bottle with a cork top | all plastic #1f8a2c | above wood #b98a5a
 rusty iron gate with peeling white paint | all rust #7a3b1d | chips paint #eeeeee
 steel knife with an ebony handle | all metal #c6c6c4 | below wood #2a211c
 terracotta pot with a white glazed rim | all ceramic #b8623f | above ceramic #eeeeee
-cast iron pan with a wooden handle | all metal #a0a0a0 | below wood #92633b
+cast iron pan with a wooden handle | all metal #4e4d4c | below wood #92633b
 gray granite with copper inlay | all stone #8a8684 | veins/bands metal #fad1c2
 black and white checkered marble floor | all stone #1a1a1a | checks stone #eeeeee
 red and white striped canvas tent | all fabric #c01818 | stripes fabric #eeeeee

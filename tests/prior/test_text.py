@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import torch
 
-from stages.prior.colors import COLORS
+from stages.prior.colors import WORDS
 from stages.prior.model import VOCABULARY_FILE
 from stages.prior.names import OBJECTS, SUBSTANCES
 from stages.prior.text import MAX_WORDS, TextEmbedding, TextEncoder, Vocabulary, split_words
@@ -72,7 +72,7 @@ def test_a_word_that_was_never_taught_is_read_as_what_explains_it() -> None:
 def test_words_of_captions_are_read_as_they_are(vocabulary: Vocabulary) -> None:
     """The shipped explanations touch no word that training uses, such as "base" or "spots"."""
     names = [name for substance in SUBSTANCES for name in substance.names]
-    taught = template_words() | {word for text in (*names, *COLORS, *OBJECTS) for word in split_words(text)}
+    taught = template_words() | {word for text in (*names, *WORDS, *OBJECTS) for word in split_words(text)}
     assert not taught & set(vocabulary.explained)
     prompt = "oak base and gold top with white spots"
     assert vocabulary.read(prompt) == split_words(prompt)

@@ -267,7 +267,7 @@ def velvet(at: Place) -> Look:
     nap = fbm(bent, Spectrum(0.14, 0.03, 0.5, (0.7, 1.3, 1), patch=0.4), 2)
     comb = fbm(flat, Spectrum(0.008, 0.0005, 1.0, (0.35, 1.6, 1), 0.4, 0.15, 0.5), 3)
     tip = fbm(flat, Spectrum(0.0012, 0.00012, 1.05, (0.8, 1.2, 1), 0.5, 0.2, 0.4), 4)
-    turned = np.tanh(0.9 * nap) + 0.22 * comb
+    turned = 0.45 * np.tanh(0.9 * nap) + 0.22 * comb
     spectrum = Spectrum(0.0012, 0.00012, 1.05, (0.8, 1.2, 1))
     color = averaged(
         0.42 + 0.22 * turned + 0.13 * tip, 0.13 * lost(flat, spectrum), "#3a0812", "#5a0d1c", "#7d1428", "#a62e40", "#c55a66"
