@@ -75,6 +75,7 @@ def main() -> None:
     """Entry point: errors become one line and an exit code; SIGTERM ends like Ctrl-C, in a state that resumes."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")  # threads of torch that wait leave their core to others
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # those of numpy and scipy would not, and their matrices are small
     try:
         cli(standalone_mode=False)
     except DreammatError as error:

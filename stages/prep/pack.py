@@ -267,10 +267,19 @@ def _columns(start: NDArray, end: NDArray, chart: NDArray, widths: NDArray) -> l
 
 def _widened(profile: _Profile, margin: int, height: int) -> _Profile:
     """A profile grown by `margin` cells on every side, counted from its new lowest corner."""
-    low = np.pad(np.clip(profile[0], 0, height), 2 * margin, constant_values=height)
-    high = np.pad(np.clip(profile[1], 0, height), 2 * margin, constant_values=0)
-    window = np.lib.stride_tricks.sliding_window_view
-    return window(low, 2 * margin + 1).min(1), window(high, 2 * margin + 1).max(1) + 2 * margin
+    return _grown(*profile, int(margin), int(height))
+
+
+@compiled
+def _grown(low, high, margin, height):  # type: ignore[no-untyped-def]
+    count, reach = len(low), 2 * margin
+    bottom, top = np.full(count + reach, height), np.zeros(count + reach, np.int64)
+    for i in range(count + reach):
+        for j in range(max(i - reach, 0), min(i + 1, count)):
+            bottom[i] = min(bottom[i], max(low[j], 0))
+            top[i] = max(top[i], min(high[j], height))
+        top[i] += reach
+    return bottom, top
 
 
 def turned(points: NDArray, size: NDArray, quarter: NDArray) -> NDArray[np.float64]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+
+from stages.core.parallel import compiled
 
 
 @dataclass(frozen=True)
@@ -26,18 +26,38 @@ def edges(ids: NDArray) -> Edges:
     """Edges of triangles `ids` (F, 3)."""
     start, end = ids.reshape(-1).astype(np.int64), np.roll(ids, -1, 1).reshape(-1).astype(np.int64)
     low, high = np.minimum(start, end), np.maximum(start, end)
-    _, edge, faces = np.unique(low * (high.max(initial=0) + 1) + high, return_inverse=True, return_counts=True)
-    order = np.argsort(edge, kind="stable")
-    first = np.cumsum(faces) - faces
+    code = low * (high.max(initial=0) + 1) + high
+    order = np.argsort(code, kind="stable")
+    first = np.flatnonzero(np.diff(code[order], prepend=-1))
+    faces = np.diff(first, append=len(code))
+    edge = np.empty(len(code), np.int64)
+    edge[order] = np.repeat(np.arange(len(first)), faces)
     two = first[faces == 2]
     return Edges(edge, start < end, faces, np.stack([order[two], order[two + 1]], -1))
 
 
-def components(count: int, links: NDArray) -> NDArray[np.int32]:
-    """Labels (count,) of what is linked, numbered by their first member. links: (K, 2)."""
-    graph = coo_matrix((np.ones(len(links), np.int8), (links[:, 0], links[:, 1])), shape=(count, count))
-    labels = connected_components(graph, directed=False)[1]
-    return renumber(labels)
+@compiled
+def components(count, links):  # type: ignore[no-untyped-def]
+    """Labels (count,) int32 of what is linked, numbered by their first member. Args: links: (K, 2).
+
+    Source: Tarjan & van Leeuwen 1984, "Worst-case Analysis of Set Union Algorithms" (path halving).
+    """
+    parent = np.arange(count)  # never after its children
+    for k in range(len(links)):
+        a, b = links[k, 0], links[k, 1]
+        while parent[a] != a:
+            parent[a] = parent[parent[a]]
+            a = parent[a]
+        while parent[b] != b:
+            parent[b] = parent[parent[b]]
+            b = parent[b]
+        parent[max(a, b)] = min(a, b)
+    labels = np.empty(count, np.int32)
+    found = 0
+    for i in range(count):
+        labels[i] = labels[parent[i]] if parent[i] < i else found
+        found += parent[i] == i
+    return labels
 
 
 def renumber(labels: NDArray) -> NDArray[np.int32]:

@@ -163,11 +163,16 @@ def ring_of_cameras(count: int, elevation: float = 0.5, distance: float = 3.0) -
     return look_at(eye, np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
 
+def cameras_around() -> NDArray[np.float64]:
+    """c2w (N, 4, 4) of cameras from which all of a convex thing is seen."""
+    return np.concatenate([ring_of_cameras(4, 0.6), ring_of_cameras(4, -0.6)])
+
+
 def save_material(
     path: Path, prep: Path, residual: Residual, c2w: NDArray | None = None, recipe: Recipe = EVEN, survey: Survey = EMPTY
 ) -> Path:
     """Write material.npz for a prep.npz."""
-    cameras = ring_of_cameras(6) if c2w is None else c2w
+    cameras = cameras_around() if c2w is None else c2w  # surface that no view saw takes long to fill
     arrays = {
         **survey.to_arrays(),
         **residual.to_arrays(),

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, maximum_filter1d, minimum_filter1d
 
 from stages.prep import charts, unwrap, xatlas_worker
 from stages.prep.merge import SQUASHED
 from stages.prep.overlap import overlapping
-from stages.prep.pack import pack
+from stages.prep.pack import _widened, pack
 from stages.prep.stitch import stitch
 from stages.prep.topology import renumber
 from stages.prep.uv import coverage, overlap, signed_area, uv_charts
@@ -187,3 +187,18 @@ def test_growing_charts_keeps_flat_sides_whole() -> None:
     vertices, triangles = cube()
     chart = charts.grow(vertices, triangles, np.arange(12))
     assert len(set(chart)) <= 6 and (chart[::2] == chart[1::2]).all()
+
+
+@pytest.mark.parametrize("margin", [0, 1, 5])
+def test_a_profile_grows_by_its_margin_on_every_side(margin: int) -> None:
+    """Against SciPy's filters over the padded profile; some columns are empty, as where a chart only touches them."""
+    rng = np.random.default_rng(margin)
+    low, high = rng.integers(0, 30, 60), rng.integers(10, 42, 60)
+    low[[3, 40]], high[[3, 40]] = np.iinfo(np.int64).max, 0
+    bottom, top = _widened((low, high), margin, 40)
+    inner, outer = np.clip(low, 0, 40), np.clip(high, 0, 40)
+    size = 2 * margin + 1
+    lowest = minimum_filter1d(np.pad(inner, margin, constant_values=40), size, mode="constant", cval=40)
+    highest = maximum_filter1d(np.pad(outer, margin), size, mode="constant", cval=0) + 2 * margin
+    np.testing.assert_array_equal(bottom, lowest)
+    np.testing.assert_array_equal(top, highest)
