@@ -7,6 +7,7 @@ DREAMMAT := $(RUN)/dreammat
 INSTALL := $(RUN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 VALIDATOR := $(VENV)/.validator
 DIFFUSION := $(VENV)/.diffusion
+ENGINE  := $(VENV)/.engine
 MITSUBA := $(VENV)/.mitsuba
 CYCLES  := $(VENV)/.cycles
 CHROMIUM := $(VENV)/.chromium
@@ -41,10 +42,10 @@ OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" 
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test campaign hostile uvs parts lint asset batch scene export docs bench beside clean
+.PHONY: help setup demo test test-workflow campaign hostile uvs parts lint asset batch scene export docs bench beside clean
 
 help:  ## show this list
-	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 setup: $(VENV)/.ready  ## make the virtual environment and install everything into it
 
@@ -61,6 +62,11 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 # the packages of --guidance sd, which its tests run on a tiny model
 $(DIFFUSION): pyproject.toml constraints.txt | $(VENV)/.ready
 	$(INSTALL) --editable '.[sd]'
+	@touch $@
+
+# the engine of workflow/, which its tests and `make test-workflow` run
+$(ENGINE): pyproject.toml | $(VENV)/.ready
+	$(INSTALL) --editable '.[batch]'
 	@touch $@
 
 # the Khronos glTF validator, where npm can get it; its test says so and skips otherwise
@@ -117,6 +123,9 @@ export: $(VENV)/.ready  ## every asset of JOBS for another program: make export 
 
 test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION) $(CHROMIUM)  ## all tests
 	NODE_PATH=$(VENV)/node_modules $(RUN)/python -m pytest -q -n 2 --dist loadfile
+
+test-workflow: $(ENGINE)  ## four tiny jobs on the workflow, killed in the middle and run again: the same bytes, nothing twice
+	$(RUN)/python -m tests.batch.campaign
 
 campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.campaign --reads 1000 --damages 100 --kills 100

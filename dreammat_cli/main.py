@@ -23,6 +23,8 @@ COMMANDS = {
     "export": "Write an asset for Blender, Unreal, Unity, the web, USD or MaterialX.",
     "material": "Write tiling maps of a material from a prompt alone.",
     "report": "Measure speed against error.",
+    "plan": "Say what many jobs will cost, before they run.",
+    "summary": "Say what has become of many jobs.",
     "train": "Train the diffusion models.",
     "eval": "Measure assets: CLIP score and FID.",
     "doctor": "Check this machine, and say how to mend what is wrong.",

@@ -9,6 +9,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 ALLOWED = {
     "core": set(),
+    "batch": {"core"},
     "light": {"core"},
     "material": {"core"},
     "asset": {"core", "light"},

@@ -169,7 +169,8 @@ def bake(
             covered.append(on_charts)
         extra = {**describe(mesh, made), **shares(covered), "sets": [of.to_json() for of in sets]}
         files, report = write_asset(out, (prep, subject), shown, replace(wanted, extra=extra), progress)
-        measured["texture_size"] = max(of.size for of in sets)
+        measured |= {"texture_size": max(of.size for of in sets), "texels": sum(of.size**2 for of in sets)}
+        measured["triangles"] = len(mesh["triangles"])
     return BakeResult(out, False, sorted(files), report)
 
 

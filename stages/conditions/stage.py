@@ -122,6 +122,7 @@ def conditions(
         progress("views", options.views, options.views)
         write_sheet(out, sheet(out, names, options.views))
         log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(quality), "expected_percent": expected}
+        log |= {"environments": len(lights), "triangles": len(scene.triangles), "quality": options.quality}
     extra = {
         "environments": names,
         "views": options.views,

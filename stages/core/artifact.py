@@ -190,15 +190,17 @@ def save_npz(path: Path, schema: Schema, arrays: Mapping[str, NDArray], provenan
 
 @contextlib.contextmanager
 def run_log(artifact: Path) -> Iterator[dict[str, Any]]:
-    """Measure the block and write `<artifact>.run.json` (inside it for a folder): seconds, peak memory, extras.
+    """Measure the block and write `<artifact>.run.json` (inside it for a folder): seconds, CPU seconds (with those of processes
+    that it started), peak memory, extras.
 
     Yields: a dict to which the stage adds what else it measured. Nothing is written when the block fails.
     """
     measured: dict[str, Any] = {}
-    start = time.perf_counter()
+    start, before = time.perf_counter(), sum(os.times()[:4])
     yield measured
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-    log = {"seconds": round(time.perf_counter() - start, 3), "peak_memory_gib": round(peak, 3), **measured}
+    clocks = {"seconds": time.perf_counter() - start, "cpu_seconds": sum(os.times()[:4]) - before, "peak_memory_gib": peak}
+    log = {**{name: round(value, 3) for name, value in clocks.items()}, **measured}
     write_json(artifact / "run.json" if artifact.is_dir() else artifact.with_name(artifact.name + ".run.json"), log)
 
 

@@ -30,9 +30,11 @@ def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @functools.cache
 def cores() -> int:
-    """Processor cores that this process may use: those it is bound to, or fewer where a container's quota pays for fewer."""
+    """Processor cores that this process may use: those it is bound to, or fewer where a container's quota pays for fewer or
+    OMP_NUM_THREADS asks for fewer, as engines do that share a machine out among jobs."""
     bound = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return max(1, math.ceil(min(bound, quota())))
+    asked = os.environ.get("OMP_NUM_THREADS", "")
+    return max(1, math.ceil(min(bound, quota(), int(asked) if asked.isdecimal() else math.inf)))
 
 
 def quota(root: Path = Path("/")) -> float:

@@ -63,11 +63,12 @@ def prep(mesh: Path, out: Path, options: PrepOptions, force: bool = False, progr
     made = None if force else peek(out, PREP)
     if made is not None and made.same_request(request):
         return PrepResult(True, made.extra["findings"])
-    with run_log(out):
+    with run_log(out) as log:
         progress("read", 0, 4)
         arrays, extra = prepared(READERS[mesh.suffix.lower()](mesh), mesh, options, progress)
         save_npz(out, PREP, arrays, Provenance(request.options, None, request.inputs, extra))
         progress("write", 4, 4)
+        log["triangles"] = len(arrays["triangles"])
     return PrepResult(False, extra["findings"])
 
 

@@ -55,7 +55,11 @@ def test_no_control_groups_no_quota(tmp_path: Path) -> None:
 def test_cores_are_the_bound_ones_that_are_paid_for(monkeypatch: pytest.MonkeyPatch, paid: float, expected: int) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {1, 3, 5, 7}, raising=False)
     monkeypatch.setattr(parallel, "quota", lambda: paid)
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     assert parallel.cores.__wrapped__() == expected
+    for asked, at_most in {"2": 2, "9": 4, "2,1": 4, "0": 1, "": 4}.items():
+        monkeypatch.setenv("OMP_NUM_THREADS", asked)
+        assert parallel.cores.__wrapped__() == min(expected, at_most)
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="needs a system that binds processes to cores")

@@ -1,0 +1,171 @@
+"""Tiny jobs on the workflow, killed in the middle and run again: the same bytes as by hand, and nothing done twice.
+
+    python -m tests.batch.campaign [--jobs 4] [--kills 1] [--folder FOLDER]
+
+Beside the jobs stands one with a broken mesh, which must fail alone.
+"""
+
+import argparse
+import os
+import random
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from dreammat_cli.jobs import read
+from stages.batch.jobs import Job, shared
+from stages.batch.summary import outputs
+from tests.pipeline import cube_sphere, fingerprint
+
+ROOT = Path(__file__).resolve().parents[2]
+TINY = {
+    "prep": "--texture-size 64 --padding 2 --unwrap-triangles 0",
+    "conditions": "--views 3 --size 16 --env overcast --quality draft",
+    "distill": "--steps 1",
+    "bake": "--size 512 --preview-size 32 --occlusion-rays 1",
+}
+PROMPTS = ("copper", "oak", "red plastic", "granite", "rust")
+A_MESH = 2
+"""Meshes for so many jobs each, at least."""
+
+MESHES = 10
+"""Most meshes there are."""
+
+TWICE = re.compile(r"^Finished jobid: \d+ \(Rule: (prep|conditions|distill|bake)\)", re.M)
+
+
+def write_jobs(folder: Path, count: int, broken: bool = True) -> Path:
+    """A jobs file with so many jobs, and their meshes."""
+    meshes = [f"mesh_{i}.obj" for i in range(min(MESHES, -(-count // A_MESH)))]
+    for i, name in enumerate(meshes):
+        cube_sphere(folder / name, 3 + i % 3)
+    rows = [f"{name},{mesh},{prompt},{seed},{','.join(TINY.values())}" for name, mesh, prompt, seed in (
+        (f"job_{k}", meshes[k % len(meshes)], PROMPTS[k % len(PROMPTS)], k) for k in range(count))]  # fmt: skip
+    if broken:
+        (folder / "broken.obj").write_text("v 0 0\nf 1 2 3\n")
+        rows.append(f"broken,broken.obj,oak,0,{','.join(TINY.values())}")
+    path = folder / "jobs.csv"
+    path.write_text("\n".join(["name,mesh,prompt,seed,prep,conditions,distill,bake", *rows]) + "\n")
+    return path
+
+
+def engine(jobs: Path, *words: str) -> list[str]:
+    """The command line of the workflow."""
+    where = ["--snakefile", str(ROOT / "workflow/Snakefile"), "--profile", str(ROOT / "profiles/local")]
+    return [sys.executable, "-m", "snakemake", *where, "--directory", str(jobs.parent), *words, "--config", f"jobs={jobs}"]
+
+
+def environment() -> dict[str, str]:
+    """With this checkout in front."""
+    return {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": ""}
+
+
+def run_until(jobs: Path, share: float) -> str:
+    """Run the workflow until a share of its outputs is there, then kill it and everything that it started."""
+    done = every_output(jobs)
+    log = jobs.with_name("log.txt")
+    with open(log, "w") as stream:
+        process = subprocess.Popen(
+            engine(jobs), env=environment(), stdout=stream, stderr=stream, start_new_session=True
+        )
+        while process.poll() is None and sum(path.exists() for path in done) < share * len(done):
+            time.sleep(0.5)
+        running = process.poll() is None
+        if running:
+            time.sleep(1 + 2 * random.Random(len(done)).random())  # into the middle of whatever runs
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+    assert running, f"the workflow ended by itself before {share:.0%} was done:\n{log.read_text()[-2000:]}"
+    subprocess.run([*engine(jobs), "--unlock"], env=environment(), check=True, capture_output=True)
+    return log.read_text()
+
+
+def every_output(jobs: Path) -> list[Path]:
+    """What completes each command of each job that can be done, each once."""
+    found = [path for job in read(jobs)[0] if job.name != "broken" for path in outputs(job, jobs.with_suffix("")).values()]
+    return list(dict.fromkeys(found))
+
+
+def times(jobs: Path) -> dict[Path, int]:
+    """When each file of a finished command, and each view of an unfinished one, was written."""
+    folders = [path.parent for path in every_output(jobs) if path.exists() and path.suffix == ".json"]
+    files = [file for folder in folders for file in folder.rglob("*") if file.is_file()]
+    files += [path for path in every_output(jobs) if path.exists()]
+    return {file: file.stat().st_mtime_ns for file in files if file.name != ".snakemake_timestamp"}
+
+
+def by_hand(jobs: list[Job], folder: Path) -> None:
+    """The same with the four commands, one after the other."""
+    def dreammat(*words: str) -> None:
+        subprocess.run([sys.executable, "-m", "dreammat_cli", *words, "-q"], env=environment(), check=True)
+
+    shapes, lit = shared(jobs)
+    for name, job in shapes.items():
+        dreammat("prep", str(job.mesh), "-o", f"{folder}/shapes/{name}/prep.npz", *job.words("prep"))
+    for (name, light), job in lit.items():
+        shape = f"{folder}/shapes/{name}"
+        dreammat("conditions", f"{shape}/prep.npz", "-o", f"{shape}/{light}", *job.words("conditions"))
+    for job in jobs:
+        shape, material = f"{folder}/shapes/{job.shape}", f"{folder}/{job.name}/material.npz"
+        dreammat("distill", f"{shape}/{job.lit}", "-o", material, *job.words("distill"))
+        dreammat("bake", f"{shape}/prep.npz", material, "-o", f"{folder}/{job.name}/asset", *job.words("bake"))
+
+
+def artefacts(folder: Path) -> dict[str, str]:
+    """Hashes of what jobs made, by path."""
+    extra = (".snakemake_timestamp", "thumbnails/", "logs/", "benchmarks/", "summary.")
+    return {name: digest for name, digest in fingerprint(folder).items() if not any(part in name for part in extra)}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--jobs", type=int, default=4)
+    parser.add_argument("--kills", type=int, default=1)
+    parser.add_argument("--by-hand", type=int, default=4, help="jobs that are also done by hand, to compare")
+    parser.add_argument("--folder", type=Path, help="where; kept afterwards")
+    chosen = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        campaign(chosen, chosen.folder or Path(scratch))
+
+
+def campaign(chosen: argparse.Namespace, folder: Path) -> None:
+    """Write jobs, run them through kills, compare."""
+    folder.mkdir(parents=True, exist_ok=True)
+    jobs = write_jobs(folder.resolve(), chosen.jobs)
+    twice = 0
+    for kill in range(chosen.kills):
+        log = run_until(jobs, (kill + 1) / (chosen.kills + 1.5))
+        before = times(jobs)
+        print(f"killed: {len(TWICE.findall(log))} commands had been done since the last time", flush=True)
+    last = subprocess.run(engine(jobs), env=environment(), capture_output=True, text=True)
+    assert last.returncode == 1, f"the broken mesh should fail the whole at its end:\n{last.stderr[-2000:]}"
+    after = times(jobs)
+    twice = sum(after.get(path) != then for path, then in before.items())
+    told = (jobs.with_suffix("") / "summary.csv").read_text().splitlines()
+    states = [line.split(",")[1] for line in told[1:]]
+    assert states == ["done"] * chosen.jobs + ["failed"], "\n".join(told)
+    assert "broken,failed,prep," in told[-1] and "broken.obj" in told[-1], told[-1]
+    changed = jobs.read_text().replace(",copper,", ",brass,", 1)
+    jobs.write_text(changed)
+    again = subprocess.run(engine(jobs, "-n"), env=environment(), capture_output=True, text=True).stdout
+    counts = {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", again, re.M)}
+    left = {"prep": 1, "conditions": 1, "distill": 2, "bake": 2}  # of the broken one, and what a prompt brings with it
+    assert {rule: counts.get(rule) for rule in left} == left, again
+    jobs.write_text(changed.replace(",brass,", ",copper,", 1))
+    sample = [job for job in read(jobs)[0] if job.name != "broken"][:: max(1, chosen.jobs // chosen.by_hand)]
+    by_hand(sample, folder / "by_hand")
+    found, expected = artefacts(jobs.with_suffix("")), artefacts(folder / "by_hand")
+    differing = [name for name, digest in expected.items() if found.get(name) != digest]
+    assert not differing, f"other bytes than by hand: {', '.join(differing[:5])}"
+    print(f"{chosen.jobs} jobs done, the broken one failed alone; a changed prompt would redo distill and bake of its job")
+    print(f"{len(expected)} files of {len(sample)} jobs have the bytes that they have by hand")
+    print(f"done twice: {twice or 'nothing'}", flush=True)
+    assert not twice
+
+
+if __name__ == "__main__":
+    main()
