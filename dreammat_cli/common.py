@@ -40,6 +40,20 @@ class Guessing(click.Group):
         return self.commands.get(name)
 
 
+class Shard(click.ParamType):
+    """i/n, the i-th of n parts."""
+
+    name = "shard"
+
+    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value
+        part, _, parts = value.partition("/")
+        if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
+            self.fail(f"{value}: expected i/n with 1 <= i <= n, such as 2/8", param, context)
+        return int(part), int(parts)
+
+
 library_option = click.option(
     "--library", type=INPUT, metavar="FOLDER", envvar="DREAMMAT_LIBRARY",
     help="Scanned PBR sets (Poly Haven, ambientCG); what words name of them is used.  [env: DREAMMAT_LIBRARY]",

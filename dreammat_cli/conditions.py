@@ -5,7 +5,18 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, defaults, examples, lines_of, plan, reporter, show
+from dreammat_cli.common import (
+    INPUT,
+    Common,
+    Shard,
+    common_options,
+    defaults,
+    examples,
+    lines_of,
+    plan,
+    reporter,
+    show,
+)
 from stages.conditions.options import ConditionsOptions
 
 DEFAULT = defaults(ConditionsOptions)
@@ -16,6 +27,7 @@ DEFAULT = defaults(ConditionsOptions)
         "dreammat conditions chair/prep.npz -o chair/conditions",
         "dreammat conditions chair/prep.npz -o chair/conditions --views 32 --env studio --env my_office.hdr",
         "dreammat conditions chair/prep.npz -o chair/conditions --size 512 --profile sd",
+        "dreammat conditions chair/prep.npz -o chair/part_1 --shard 1/4",
     )
 )
 @click.argument("prep", type=INPUT, metavar="PREP.npz")
@@ -41,6 +53,10 @@ DEFAULT = defaults(ConditionsOptions)
 @click.option("--profile", type=click.Choice(["gltf", "sd"]), default=DEFAULT["profile"], show_default=True,
               help="sd: also smooth normals and Blender's light maps with a bounce, as the released ControlNet knows them.")
 @click.option("--maps", is_flag=True, help="Also write maps_<environment>.exr for every view.")
+@click.option("--shard", type=Shard(), default=DEFAULT["shard"], metavar="I/N",
+              help="Make the I-th of N parts of the views, for N machines, each in a folder of its own.")
+@click.option("--merge", type=INPUT, multiple=True, metavar="FOLDER",
+              help="A part that --shard made; with all N of them, and else the same options, nothing is left to be traced.")
 @common_options
 def command(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
     """Ray-trace depth, normals and light transport around the mesh of PREP.npz.
@@ -51,6 +67,8 @@ def command(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
         low, high = chosen[name]
         if low > high:
             raise click.BadParameter(f"{low:g} {high:g}: expected LOW <= HIGH", param_hint=f"--{name}")
+    if chosen["merge"] and chosen["shard"] != (1, 1):
+        raise click.UsageError("give --shard to make a part, or --merge to bring all parts together")
     options = ConditionsOptions(**chosen)
     if plan(common, "trace conditions into", output, options):
         return

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, show
+from dreammat_cli.common import INPUT, Common, common_options, examples, show
 from dreammat_cli.doctor import free_memory
 from dreammat_cli.jobs import folder_of, needs, read
 from stages.core.errors import InputError
@@ -22,7 +22,7 @@ ROW = "  {:11}{:>7}{:>7}{:>11}{:>11}{:>12}{:>10}{:>11}"
 HEADS = ("", "done", "to do", "CPU hours", "GPU hours", "GiB memory", "GiB disk", "files")
 
 
-@click.command(epilog="Example: dreammat plan jobs.csv")
+@click.command(epilog=examples("dreammat plan jobs.csv", "dreammat plan jobs.csv --from older_jobs"))
 @click.argument("jobs", type=INPUT, metavar="JOBS")
 @click.option("-o", "--output", type=INPUT, metavar="FOLDER", help="Where the batch is.  [default: JOBS without its ending]")
 @click.option("--from", "others", type=INPUT, multiple=True, metavar="FOLDER",

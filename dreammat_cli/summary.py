@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-from dreammat_cli.common import INPUT, Common, common_options, show
+from dreammat_cli.common import INPUT, Common, common_options, examples, show
 from dreammat_cli.jobs import folder_of, read
 
 
-@click.command(epilog="Example: dreammat summary jobs.csv")
+@click.command(epilog=examples("dreammat summary jobs.csv"))
 @click.argument("jobs", type=INPUT, metavar="JOBS")
 @click.option("-o", "--output", type=INPUT, metavar="FOLDER", help="Where the batch is.  [default: JOBS without its ending]")
 @common_options

@@ -5,7 +5,19 @@ from typing import Any
 
 import click
 
-from dreammat_cli.common import INPUT, Common, Guessing, common_options, defaults, examples, lines_of, plan, reporter, show
+from dreammat_cli.common import (
+    INPUT,
+    Common,
+    Guessing,
+    Shard,
+    common_options,
+    defaults,
+    examples,
+    lines_of,
+    plan,
+    reporter,
+    show,
+)
 from stages.train.options import PicturesOptions, TrainControlnetOptions, TrainPriorOptions
 
 PRIOR, PICTURES, CONTROLNET = defaults(TrainPriorOptions), defaults(PicturesOptions), defaults(TrainControlnetOptions)
@@ -22,20 +34,6 @@ def share(name: str, text: str) -> Any:
     """A share of the pictures, likewise."""
     flag = "--" + name.replace("_", "-")
     return click.option(flag, type=RATE, default=CONTROLNET[name], show_default=True, metavar="X", help=text)
-
-
-class Shard(click.ParamType):
-    """i/n, the i-th of n parts."""
-
-    name = "shard"
-
-    def convert(self, value: Any, param: click.Parameter | None, context: click.Context | None) -> tuple[int, int]:
-        if isinstance(value, tuple):
-            return value
-        part, _, parts = value.partition("/")
-        if not (part.isdecimal() and parts.isdecimal() and 1 <= int(part) <= int(parts)):
-            self.fail(f"{value}: expected i/n with 1 <= i <= n, such as 2/8", param, context)
-        return int(part), int(parts)
 
 
 @click.group(cls=Guessing)

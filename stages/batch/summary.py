@@ -52,12 +52,13 @@ def outputs(job: Job, out: Path) -> dict[str, Path]:
     return dict(zip(STAGES, files, strict=True)) | {f"export {target}": own / target for target in job.export}
 
 
-def logs(job: Job, out: Path) -> dict[str, Path]:
-    """Where the workflow keeps what each of a job's commands says."""
+def logs(job: Job, out: Path) -> dict[str, list[Path]]:
+    """Where the workflow keeps what each of a job's commands says; of conditions also what its parts say."""
     folder = out / "logs"
     names = [f"prep/{job.shape}", f"conditions/{job.shape}/{job.lit}", f"distill/{job.name}", f"bake/{job.name}"]
-    found = {stage: folder / f"{name}.log" for stage, name in zip(STAGES, names, strict=True)}
-    return found | {f"export {target}": folder / f"export/{job.name}/{target}.log" for target in job.export}
+    found = {stage: [folder / f"{name}.log"] for stage, name in zip(STAGES, names, strict=True)}
+    found["conditions"] += sorted((folder / "part" / job.shape).glob(f"{job.lit}.*.log"))
+    return found | {f"export {target}": [folder / f"export/{job.name}/{target}.log"] for target in job.export}
 
 
 def run_logs(job: Job, out: Path) -> dict[str, Path]:
@@ -77,9 +78,9 @@ def outcome(job: Job, out: Path) -> Outcome:
     if not missing:
         status = DONE
     for stage in missing:
-        log = logs(job, out)[stage]
-        if log.is_file():
-            error = last_words(log)
+        heard = [log for log in logs(job, out)[stage] if log.is_file()]
+        if heard:
+            error = next(filter(None, map(last_words, heard)), "")
             status = FAILED if error else BEGUN
             break
     own = [recorded(path) for stage, path in run_logs(job, out).items() if stage in ("distill", "bake")]

@@ -1,6 +1,7 @@
 """What `dreammat conditions` can be told."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -29,3 +30,7 @@ class ConditionsOptions:
     """for whom: "gltf" for the embedded prior and for references; "sd" adds what the released ControlNet was trained on"""
     maps: bool = False
     """also write the condition maps of every view as maps_<environment>.exr"""
+    shard: tuple[int, int] = (1, 1)
+    """make the I-th of N parts of the views alone, to be merged"""
+    merge: tuple[Path, ...] = ()
+    """folders of all N parts, whose views are brought together"""

@@ -15,6 +15,7 @@ from stages.conditions.cameras import Cameras, place_cameras
 from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.predict import choose_quality
+from stages.conditions.shards import SHARD, merge, views_of
 from stages.core.artifact import (
     MANIFEST,
     Artifact,
@@ -86,11 +87,16 @@ def conditions(
     lights, clamped, hashes = read_lights(options.env)
     names = tuple(light.name for light in lights)
     chosen = plain_options(replace(options, env=names))
+    del chosen["shard"], chosen["merge"]  # views are the same, however they were divided
     request = Provenance(chosen, options.seed, {"prep": sha256_file(prep), **hashes})
-    if not force and (done := peek(out, CONDITIONS)) and done.same_request(request):
-        return ConditionsResult(names, 0, options.views, clamped, True)
+    mine, whole = views_of(options.shard, options.views), options.shard[1] == 1
+    done = None if force else peek(out, CONDITIONS if whole else SHARD)
+    if done and done.same_request(request) and (whole or done.extra["shard"] == list(options.shard)):
+        return ConditionsResult(names, 0, len(mine), clamped, True)
 
     start_folder(out, request, force)
+    if options.merge:
+        merge(options.merge, out, request)
     with run_log(out) as log:
         cameras = place_cameras(mesh["vertices"].astype(np.float64), options)
         save_cameras(out, cameras, request, options)
@@ -98,8 +104,9 @@ def conditions(
             save_environment(out / "environments" / f"{light.name}.exr", light)
         scene = traced_scene(mesh)
         label = labels(mesh)
-        survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.hidden, label)
-        save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
+        if whole:
+            survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.hidden, label)
+            save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None
         subject = Subject(scene, smooth, label, shared_texels(mesh))
         quality, expected = QUALITY[options.quality], None
@@ -107,20 +114,21 @@ def conditions(
             progress("choosing rays", 0, 1)
             first = trace_view(scene, cameras.c2w[0], float(cameras.fov_y[0]), options.size, options.size)
             quality, expected = choose_quality(scene, first, lights, options.error, options.seed)
-        missing = [view for view in range(options.views) if not view_is_there(out, view, names, options)]
+        missing = [view for view in mine if not view_is_there(out, view, names, options)]
         made = len(missing)
         with ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
             written = None
             for i, view in enumerate(missing):
-                progress("views", options.views - made + i, options.views)
+                progress("views", len(mine) - made + i, len(mine))
                 traced = trace(view, subject, cameras, lights, quality, options)
                 if written:
                     written.result()
                 written = writer.submit(write, out, view, lights, traced, options)
             if written:
                 written.result()
-        progress("views", options.views, options.views)
-        write_sheet(out, sheet(out, names, options.views))
+        progress("views", len(mine), len(mine))
+        if whole:
+            write_sheet(out, sheet(out, names, options.views))
         log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(quality), "expected_percent": expected}
         log |= {"environments": len(lights), "triangles": len(scene.triangles), "quality": options.quality}
     extra = {
@@ -133,10 +141,14 @@ def conditions(
         "parts": [part.to_json() for part in labelled_parts(mesh)],
         "shared_labels": shared_labels(subject),
     }
-    files = expected_files(names, options)
-    write_manifest(out, CONDITIONS, Provenance(request.options, request.seed, request.inputs, extra), files)
+    if whole:
+        files = expected_files(names, options)
+        write_manifest(out, CONDITIONS, replace(request, extra=extra), files)
+    else:
+        files = [file for view in mine for file in view_files(view, names, options)]
+        write_manifest(out, SHARD, replace(request, extra={"shard": options.shard}), files)
     (out / REQUEST).unlink(missing_ok=True)
-    return ConditionsResult(names, made, options.views - made, clamped, False, expected)
+    return ConditionsResult(names, made, len(mine) - made, clamped, False, expected)
 
 
 def read_lights(env: tuple[str, ...]) -> tuple[list[Environment], dict[str, int], dict[str, str]]:
@@ -171,7 +183,7 @@ def start_folder(out: Path, request: Provenance, force: bool) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         if force or read_json(out / REQUEST) != asked:
-            for name in (MANIFEST, REQUEST, "cameras.npz", "survey.npz", "sheet.png", "run.json"):
+            for name in (MANIFEST, SHARD.manifest, REQUEST, "cameras.npz", "survey.npz", "sheet.png", "run.json"):
                 (out / name).unlink(missing_ok=True)
             for folder in [out / "environments", *out.glob("view_[0-9][0-9][0-9]*")]:
                 shutil.rmtree(folder, ignore_errors=True)

@@ -11,7 +11,7 @@ from dreammat_cli.jobs import needs
 from stages.batch import costs
 from stages.batch.jobs import Job
 from stages.batch.plan import plan, speeds
-from stages.batch.summary import last_words, logs, outputs, run_logs, summarise
+from stages.batch.summary import last_words, logs, outcome, outputs, run_logs, summarise
 from stages.core.images import read_image, write_png
 
 
@@ -32,9 +32,9 @@ def jobs(tmp_path: Path) -> list[Job]:
     (out / "done/asset/report.html").write_text("report")
     for stage, path in run_logs(done, out).items():
         path.write_text(json.dumps({"seconds": 10, "cpu_seconds": 5 if stage == "bake" else 2, "peak_memory_gib": 0.5}))
-    said = {logs(baking, out)["bake"]: "bake 3/7\nerror: asset: no space left on device\n", logs(begun, out)["distill"]: "",
-            logs(bad, out)["prep"]: "bash: line 1: dreammat: command not found\n"}  # fmt: skip
-    for log, text in said.items():
+    said = [(logs(baking, out)["bake"], "bake 3/7\nerror: asset: no space left on device\n"), (logs(begun, out)["distill"], ""),
+            (logs(bad, out)["prep"], "bash: line 1: dreammat: command not found\n")]  # fmt: skip
+    for (log,), text in said:
         log.parent.mkdir(parents=True, exist_ok=True)
         log.write_text(text)
     return jobs
@@ -60,6 +60,17 @@ def test_every_job_has_a_row_a_picture_and_its_error(jobs: list[Job], tmp_path: 
 def test_conditions_that_were_removed_are_not_missed(jobs: list[Job], tmp_path: Path) -> None:
     outputs(jobs[0], tmp_path / "out")["conditions"].unlink()
     assert summarise(jobs[:1], [], tmp_path / "out").startswith("1 done;")
+
+
+def test_an_error_of_a_part_of_the_views_is_that_of_the_conditions(jobs: list[Job], tmp_path: Path) -> None:
+    bad = jobs[-1]
+    prep = outputs(bad, tmp_path / "out")["prep"]
+    log = tmp_path / "out/logs/part" / bad.shape / f"{bad.lit}.2-of-4.log"
+    for path, text in {prep: "x", log: "error: sky.hdr: no such file\n"}.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    one = outcome(bad, tmp_path / "out")
+    assert (one.status, one.stage, one.error) == ("failed", "conditions", "sky.hdr: no such file")
 
 
 def test_an_error_is_one_line_wherever_it_stands(tmp_path: Path) -> None:
