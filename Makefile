@@ -42,7 +42,7 @@ OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" 
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test test-workflow campaign hostile uvs parts lint asset batch scene export docs bench beside clean
+.PHONY: help setup demo test test-workflow test-cluster campaign hostile uvs parts lint asset batch scene export docs bench beside clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -94,10 +94,17 @@ asset: $(VENV)/.ready  ## one mesh and prompt: make asset MESH=chair.obj PROMPT=
 	@[ -n "$$MESH" ] && [ -n "$$PROMPT" ] || { echo 'usage: make asset MESH=chair.obj PROMPT="a carved oak chair"' >&2; exit 2; }
 	@name=$$(basename "$$MESH") && $(DREAMMAT) run "$$MESH" --prompt "$$PROMPT" -o "$${OUT:-assets/$${name%.*}}" $(OPTIONS)
 
-# a target for each folder, by its number, since a target's name cannot hold what a folder's may
+# a target for each folder, by its number, since a target's name cannot hold what a folder's may; of the jobs that -j asks for at once
+# as many as fit in memory and cores, and each the cores that are its share
 batch: $(VENV)/.ready  ## every folder of JOBS with a mesh and a prompt.txt: make -j2 batch JOBS=jobs
 	@count=$$($(FOLDERS) | wc -l); [ $$count -gt 0 ] || { echo "$$JOBS: no folder there holds a prompt.txt" >&2; exit 1; }; \
-	$(MAKE) --no-print-directory $$(seq -f job-%.0f $$count)
+	room=$$($(DREAMMAT) plan "$$JOBS" --at-once $(OPTIONS)) || exit; \
+	asked=$$(echo " $$MAKEFLAGS " | sed -n 's/.* -j\([0-9]*\) .*/\1/p'); \
+	case " $$MAKEFLAGS " in *" -j "*) asked=$$room;; esac; \
+	once=$${asked:-1}; [ $$once -le $$room ] || { once=$$room; echo "$$once at once: more do not fit in this machine's cores and memory" >&2; }; \
+	export OMP_NUM_THREADS=$$((($$(nproc) + once - 1) / once)); \
+	export MAKEFLAGS="$$(echo "$$MAKEFLAGS" | sed 's/ *-j[0-9]*\|--jobserver-[a-z]*=[^ ]*//g')"; \
+	$(MAKE) --no-print-directory -j$$once $$(seq -f job-%.0f $$count)
 
 FOLDERS = find "$$JOBS" -mindepth 2 -maxdepth 2 -name prompt.txt 2>/dev/null | sort
 MESHES  = obj|glb|gltf|fbx|usdz|usdc|usda|usd|ply|stl|off
@@ -126,6 +133,9 @@ test: $(VENV)/.ready $(VALIDATOR) $(DIFFUSION) $(CHROMIUM)  ## all tests
 
 test-workflow: $(ENGINE)  ## four tiny jobs on the workflow, killed in the middle and run again: the same bytes, nothing twice
 	$(RUN)/python -m tests.batch.campaign
+
+test-cluster: $(ENGINE)  ## twenty tiny jobs on Slurm with two virtual nodes here, of which both die once; needs root and Debian's Slurm
+	$(RUN)/python -m tests.batch.cluster
 
 campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.campaign --reads 1000 --damages 100 --kills 100

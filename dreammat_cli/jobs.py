@@ -2,6 +2,7 @@
 
 import functools
 import shlex
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -49,15 +50,16 @@ def given(stage: str, text: str) -> dict[str, Any]:
     return command.make_context(stage, words).params
 
 
-def needs(job: Job, prepared: Path) -> dict[str, costs.Need]:
-    """What each of a job's commands needs. Args: prepared: its prep.npz, which need not be there."""
-    options = {stage: given(stage, job.options.get(stage, "")) for stage in STAGES}
+def needs(job: Job, prepared: Path, further: Sequence[tuple[str, str]] = ()) -> dict[str, costs.Need]:
+    """What each of a job's commands needs. Args: prepared: its prep.npz, if that is there. further: options of stages."""
+    texts = {stage: [text for name, text in further if name == stage] + [job.options.get(stage, "")] for stage in STAGES}
+    options = {stage: given(stage, " ".join(of_stage)) for stage, of_stage in texts.items()}
     return costs.of(options, costs.triangles_of(job.mesh, prepared))
 
 
-def read(path: Path) -> tuple[list[Job], list[str]]:
-    """Jobs that can be done and a line for every mistake. Raises: InputError."""
-    return read_jobs(path, wrong)
+def read(path: Path, there: bool = True) -> tuple[list[Job], list[str]]:
+    """Jobs that can be done and a line for every mistake. Args: there: meshes must be. Raises: InputError."""
+    return read_jobs(path, wrong, there)
 
 
 def folder_of(path: Path) -> Path:

@@ -1,5 +1,6 @@
 """dreammat plan"""
 
+import functools
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,7 +9,8 @@ import click
 
 from dreammat_cli.common import INPUT, Common, common_options, examples, show
 from dreammat_cli.doctor import free_memory
-from dreammat_cli.jobs import folder_of, needs, read
+from dreammat_cli.jobs import folder_of, needs, read, wrong
+from dreammat_cli.run import STAGES, split
 from stages.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -27,25 +29,37 @@ HEADS = ("", "done", "to do", "CPU hours", "GPU hours", "GiB memory", "GiB disk"
 @click.option("-o", "--output", type=INPUT, metavar="FOLDER", help="Where the batch is.  [default: JOBS without its ending]")
 @click.option("--from", "others", type=INPUT, multiple=True, metavar="FOLDER",
               help="A folder of earlier runs on this machine, whose recorded times count too. Repeat for more.")
+@click.option("--with", "further", type=(click.Choice(STAGES), str), multiple=True, metavar="STAGE OPTIONS",
+              help="Options of a stage for all jobs, as for dreammat run. Repeat for more.")
 @click.option("--at-once", is_flag=True, help="Print only how many jobs this machine can run at once, by its cores and memory.")
 @common_options
-def command(jobs: Path, output: Path | None, others: tuple[Path, ...], at_once: bool, common: Common) -> None:
+def command(
+    jobs: Path,
+    output: Path | None,
+    others: tuple[Path, ...],
+    further: tuple[tuple[str, str], ...],
+    at_once: bool,
+    common: Common,
+) -> None:
     """Check JOBS, and say what is left to do and what it will cost: time, memory, disk, files.
 
     JOBS is a .csv or .toml file, or a folder of jobs as for `make batch`. Every mistake in it is named, a line each.
     """
     from stages.batch.plan import plan
 
+    for stage, text in further:
+        if problem := wrong(stage, split(text)):
+            raise click.UsageError(f"--with {stage}: {problem}")
     found, mistakes = read(jobs)
-    for line in mistakes:
-        click.echo(f"error: {line}", err=True)
-    made = plan(found, needs, output or folder_of(jobs), others)
+    made = plan(found, functools.partial(needs, further=further), output or folder_of(jobs), others)
     room = fitting(made.total)
     if at_once:
         click.echo(room)
-    else:
-        data = {"jobs": len(found), "mistakes": mistakes, **asdict(made), "total": asdict(made.total), "at_once": room}
-        show(common, data, [f"{jobs}: {len(found)} jobs", *table(made), *remarks(made, room)])
+        return
+    for line in mistakes:
+        click.echo(f"error: {line}", err=True)
+    data = {"jobs": len(found), "mistakes": mistakes, **asdict(made), "total": asdict(made.total), "at_once": room}
+    show(common, data, [f"{jobs}: {len(found)} jobs", *table(made), *remarks(made, room)])
     if mistakes:
         raise InputError(f"{jobs}: {len(mistakes)} mistakes; mend these lines, they are not counted above")
 

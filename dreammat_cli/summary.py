@@ -11,8 +11,9 @@ from dreammat_cli.jobs import folder_of, read
 @click.command(epilog=examples("dreammat summary jobs.csv"))
 @click.argument("jobs", type=INPUT, metavar="JOBS")
 @click.option("-o", "--output", type=INPUT, metavar="FOLDER", help="Where the batch is.  [default: JOBS without its ending]")
+@click.option("--ended", is_flag=True, help="Nothing runs any more: what was begun and is not done has failed.")
 @common_options
-def command(jobs: Path, output: Path | None, common: Common) -> None:
+def command(jobs: Path, output: Path | None, ended: bool, common: Common) -> None:
     """Say what has become of JOBS so far, and write summary.csv and summary.html, with a picture of each asset.
 
     The workflow calls it at its end; it can be called at any time while it runs.
@@ -23,5 +24,5 @@ def command(jobs: Path, output: Path | None, common: Common) -> None:
         return
     from stages.batch.summary import summarise
 
-    told = summarise(*read(jobs), out)
+    told = summarise(*read(jobs), out, ended)
     show(common, {"output": str(out / "summary.html"), "told": told}, [str(out / "summary.html"), f"  {told}"])

@@ -15,7 +15,7 @@ START = 2.0
 TRIANGLE_BYTES = {".glb": 30, ".gltf": 30, ".fbx": 30, ".stl": 50, ".ply": 30, ".usdc": 20, ".usdz": 20}
 """Bytes of a mesh file for each triangle, textures aside; of text formats 80."""
 
-QUALITY = {"draft": 0.3, "standard": 1.0, "high": 3.0}
+QUALITY = {"draft": 0.7, "standard": 1.0, "high": 3.8}
 """Time of conditions, as a multiple."""
 
 STEPS = {"prior": 60, "reference": 16_000, "sd": 4000}
@@ -27,6 +27,10 @@ ENVIRONMENTS = 5
 
 SD_STEP = 0.053
 """GPU seconds a step of Stable Diffusion: 5.5 TFLOP at a third of an A100's half-precision peak; counted, not measured."""
+
+
+UNSEEN = 16e6
+"""Bytes that a mesh is taken to have which is not to be seen here."""
 
 
 @dataclass(frozen=True)
@@ -50,33 +54,33 @@ class Need:
 
 
 def prep(triangles: float) -> Need:
-    """Of a mesh."""
+    """Of a mesh without UVs; one that has them takes a sixth of the time."""
     millions = triangles / 1e6
-    return Need(START + 1 + 50 * millions, 0.4 + 0.9 * millions, 0.15 * millions, 2)
+    return Need(START + 1 + 300 * millions, 0.3 + 1.5 * millions, 0.19 * millions, 2)
 
 
 def conditions(triangles: float, views: int, pixels: int, environments: int, quality: str = "standard") -> Need:
     """Of so many views of so many pixels each."""
-    seen = views * pixels / 2**18  # views of 512²
-    cpu = START + 3 + 2 * triangles / 1e6 + seen * (0.6 + 1.3 * environments) * QUALITY[quality]
-    memory = 0.6 + 0.6 * pixels / 2**18 + 0.6 * triangles / 1e6
-    disk = 0.0006 * environments + seen * (0.001 + 0.004 * environments)
+    millions, seen = triangles / 1e6, views * pixels / 2**18  # views of 512²
+    cpu = START + 3 + 0.5 * environments + 12 * millions + seen * (2 + 1.33 * environments) * QUALITY[quality]
+    memory = 0.5 + 0.04 * environments + 0.35 * pixels / 2**18 + 0.3 * millions
+    disk = 0.001 + 0.0012 * environments + 0.05 * millions + seen * (0.001 + 0.003 * environments)
     return Need(cpu, memory, disk, 6 + environments + views * (1 + environments))
 
 
-def distill(steps: int, views: int, pixels: int, environments: int, guidance: str = "prior") -> Need:
+def distill(steps: float, views: int, pixels: int, environments: int, guidance: str = "prior") -> Need:
     """Of so many steps; views are read whole."""
     memory = 0.6 + 0.007 * views * pixels / 2**18 * environments
     if guidance == "sd":
-        return Need(START + 20 + 0.2 * steps, memory + 8, 0.01, 4, gpu=SD_STEP * steps)
-    return Need(START + 2 + 0.1 * steps, memory, 0.01, 4)
+        return Need(START + 20 + SD_STEP * steps, memory + 8, 0.02, 4, gpu=SD_STEP * steps)
+    return Need(START + 1 + 0.15 * steps, memory, 0.02, 4)
 
 
 def bake(triangles: float, texels: float) -> Need:
     """Of textures of so many texels in all."""
-    squares = texels / 2**22  # of 2048²
-    cpu, memory = START + 8 + 55 * squares + 5 * triangles / 1e6, 0.75 + 0.5 * squares + 0.5 * triangles / 1e6
-    return Need(cpu, memory, 0.004 + 0.06 * squares, 20)
+    millions, squares = triangles / 1e6, texels / 2**22  # squares of 2048²
+    cpu, memory = START + 32 + 50 * squares + 60 * millions, 0.9 + 0.3 * squares + 0.4 * millions
+    return Need(cpu, memory, 0.005 + 0.075 * squares + 0.22 * millions, 20)
 
 
 def export(texels: float) -> Need:
@@ -108,7 +112,8 @@ def of(given: Mapping[str, Mapping[str, Any]], triangles: float) -> dict[str, Ne
 def triangles_of(mesh: Path, prepared: Path) -> float:
     """Triangles of a mesh: as `prep` recorded them, or else guessed by the file's size."""
     known = recorded(prepared.with_name(prepared.name + ".run.json")).get("triangles")
-    return float(known or mesh.stat().st_size / TRIANGLE_BYTES.get(mesh.suffix.lower(), 80))
+    size = mesh.stat().st_size if mesh.is_file() else UNSEEN
+    return float(known or size / TRIANGLE_BYTES.get(mesh.suffix.lower(), 80))
 
 
 def recorded(path: Path) -> dict[str, Any]:

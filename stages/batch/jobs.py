@@ -97,11 +97,11 @@ class Row:
     cells: dict[str, str]
 
 
-def read_jobs(path: Path, check: Check) -> tuple[list[Job], list[str]]:
+def read_jobs(path: Path, check: Check, there: bool = True) -> tuple[list[Job], list[str]]:
     """The jobs of a file or folder that can be done, and a line for every mistake.
 
     Args:
-        check: of options.
+        check: of options. there: whether a mesh that is not there is a mistake.
     Raises: InputError where the file as a whole cannot be read.
     """
     if path.is_dir():
@@ -114,7 +114,7 @@ def read_jobs(path: Path, check: Check) -> tuple[list[Job], list[str]]:
     jobs, taken = [], dict[str, str]()
     checked: dict[tuple[str, str], str] = {}
     for row in rows:
-        job, found = _job(row, path if path.is_dir() else path.parent)
+        job, found = _job(row, path if path.is_dir() else path.parent, there)
         found += _wrong_options(job, check, checked)
         if (first := taken.setdefault(job.name.lower(), row.where)) != row.where:
             found.append(f"name '{job.name}' is taken by {first}; give it a name of its own")
@@ -123,13 +123,13 @@ def read_jobs(path: Path, check: Check) -> tuple[list[Job], list[str]]:
     return jobs, mistakes
 
 
-def _job(row: Row, beside: Path) -> tuple[Job, list[str]]:
+def _job(row: Row, beside: Path, there: bool) -> tuple[Job, list[str]]:
     """A row's job, and what is wrong with it. Args: beside: where paths start."""
     cells, found = row.cells, list[str]()
     if spare := cells.get("spare"):
         found.append(f"{spare.count(', ') + 1} cell too many ({spare}); put quotes around what holds a comma")
     mesh = beside / cells.get("mesh", "")
-    found += _wrong_mesh(mesh, cells.get("mesh", ""))
+    found += _wrong_mesh(mesh, cells.get("mesh", ""), there)
     name = cells.get("name") or safe(mesh.stem)
     if name in RESERVED:
         found.append(f"name '{name}': the batch has a folder of that name; give it another")
@@ -149,12 +149,12 @@ def _job(row: Row, beside: Path) -> tuple[Job, list[str]]:
     return Job(name, mesh, prompt, tuple(parts.items()), int(seed), options, export, row.where), found
 
 
-def _wrong_mesh(mesh: Path, said: str) -> list[str]:
+def _wrong_mesh(mesh: Path, said: str, there: bool) -> list[str]:
     if not said:
         return ["no mesh; expected a path from where the jobs file is"]
     if mesh.suffix.lower() not in (*MESHES, ".npz"):
         return [f"mesh {mesh}: expected one of {' '.join(MESHES)}"]
-    return [] if mesh.is_file() else [f"mesh {mesh}: no such file"]
+    return [] if mesh.is_file() or not there else [f"mesh {mesh}: no such file"]
 
 
 def _read_parts(path: Path) -> tuple[dict[str, str], list[str]]:

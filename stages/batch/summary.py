@@ -23,6 +23,7 @@ from stages.core.errors import DreammatError
 from stages.core.images import read_image, write_png
 
 DONE, FAILED, BEGUN, WAITING, LEFT_OUT = STATES = ("done", "failed", "begun", "waiting", "left out")
+SILENT = "ended without a word: killed, out of memory or time, or its machine failed; the engine's log says which"
 THUMBNAIL = 320
 """Width of a small picture, at least."""
 
@@ -68,8 +69,11 @@ def run_logs(job: Job, out: Path) -> dict[str, Path]:
     return files | {stage: there[stage].with_name("run.json") for stage in ("conditions", "bake")}
 
 
-def outcome(job: Job, out: Path) -> Outcome:
-    """Where a job stands: its last output is there, or else what is missing was begun, has failed, or waits."""
+def outcome(job: Job, out: Path, ended: bool = False) -> Outcome:
+    """Where a job stands: its last output is there, or else what is missing was begun, has failed, or waits.
+
+    Args: ended: nothing runs any more, so what was begun has failed.
+    """
     there = outputs(job, out)
     missing = [stage for stage, path in there.items() if not path.exists()]
     status, stage, error = WAITING, "", ""
@@ -80,7 +84,7 @@ def outcome(job: Job, out: Path) -> Outcome:
     for stage in missing:
         heard = [log for log in logs(job, out)[stage] if log.is_file()]
         if heard:
-            error = next(filter(None, map(last_words, heard)), "")
+            error = next(filter(None, map(last_words, heard)), SILENT if ended else "")
             status = FAILED if error else BEGUN
             break
     own = [recorded(path) for stage, path in run_logs(job, out).items() if stage in ("distill", "bake")]
@@ -99,14 +103,14 @@ def last_words(log: Path) -> str:
     return " ".join((said or lines or [""])[-1].split())
 
 
-def summarise(jobs: Sequence[Job], mistakes: Sequence[str], out: Path) -> str:
+def summarise(jobs: Sequence[Job], mistakes: Sequence[str], out: Path, ended: bool = False) -> str:
     """Write summary.csv, summary.html and thumbnails/ into a batch's folder.
 
-    Args: mistakes: of lines of the jobs file that make no job.
+    Args: mistakes: of lines of the jobs file that make no job. ended: nothing runs any more.
     Returns: one line on all of it.
     """
     said = [line.partition(": ") for line in mistakes]
-    found = [outcome(job, out) for job in jobs] + [Outcome(where, LEFT_OUT, error=what) for where, _, what in said]
+    found = [outcome(job, out, ended) for job in jobs] + [Outcome(where, LEFT_OUT, error=what) for where, _, what in said]
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
     table.writerow([field.name for field in fields(Outcome)])

@@ -6,6 +6,7 @@ Beside the jobs stands one with a broken mesh, which must fail alone.
 """
 
 import argparse
+import base64
 import os
 import random
 import re
@@ -61,7 +62,7 @@ def engine(jobs: Path, *words: str) -> list[str]:
 
 def environment() -> dict[str, str]:
     """With this checkout in front."""
-    return {**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": ""}
+    return {**os.environ, "PYTHONPATH": str(ROOT)}
 
 
 def run_until(jobs: Path, share: float) -> str:
@@ -91,11 +92,17 @@ def every_output(jobs: Path) -> list[Path]:
 
 
 def times(jobs: Path) -> dict[Path, int]:
-    """When each file of a finished command, and each view of an unfinished one, was written."""
-    folders = [path.parent for path in every_output(jobs) if path.exists() and path.suffix == ".json"]
-    files = [file for folder in folders for file in folder.rglob("*") if file.is_file()]
-    files += [path for path in every_output(jobs) if path.exists()]
-    return {file: file.stat().st_mtime_ns for file in files if file.name != ".snakemake_timestamp"}
+    """When each file of a command was written whose end the engine saw, and each view of one that was cut off, where it will be."""
+    marks = jobs.parent / ".snakemake"
+    ended = {base64.b64decode(mark.name).decode() for mark in (marks / "metadata").iterdir()}
+    ended -= {base64.b64decode(mark.name).decode() for mark in (marks / "incomplete").iterdir()}
+    whole = [path for path in every_output(jobs) if {str(path), str(path.parent)} & ended and path.exists()]
+    files = [file for path in whole for file in ([path] if str(path) in ended else path.parent.rglob("*")) if file.is_file()]
+    found = {file: file.stat().st_mtime_ns for file in files if file.name != ".snakemake_timestamp"}
+    for folder in jobs.with_suffix("").glob("shapes/*/*.part"):
+        for view in sorted(folder.glob("view_*"))[:-1]:  # the last may have been cut off
+            found |= {folder.with_suffix("") / view.name / file.name: file.stat().st_mtime_ns for file in view.iterdir()}
+    return found
 
 
 def by_hand(jobs: list[Job], folder: Path) -> None:

@@ -73,6 +73,13 @@ def test_an_error_of_a_part_of_the_views_is_that_of_the_conditions(jobs: list[Jo
     assert (one.status, one.stage, one.error) == ("failed", "conditions", "sky.hdr: no such file")
 
 
+def test_what_was_begun_has_failed_once_nothing_runs(jobs: list[Job], tmp_path: Path) -> None:
+    assert outcome(jobs[2], tmp_path / "out").status == "begun"
+    ended = outcome(jobs[2], tmp_path / "out", ended=True)
+    assert ended.status == "failed" and ended.error.startswith("ended without a word")
+    assert outcome(jobs[3], tmp_path / "out", ended=True).status == "waiting"
+
+
 def test_an_error_is_one_line_wherever_it_stands(tmp_path: Path) -> None:
     log = tmp_path / "log"
     log.write_text("reading\nerror: cup.obj: empty\n\nslurmstepd: cancelled\n")
