@@ -92,7 +92,7 @@ def every_output(jobs: Path) -> list[Path]:
 
 
 def times(jobs: Path) -> dict[Path, int]:
-    """When each file of a command was written whose end the engine saw, and each view of one that was cut off, where it will be."""
+    """When each file was written of commands whose end the engine saw, and each view of one cut off, where it will be."""
     marks = jobs.parent / ".snakemake"
     ended = {base64.b64decode(mark.name).decode() for mark in (marks / "metadata").iterdir()}
     ended -= {base64.b64decode(mark.name).decode() for mark in (marks / "incomplete").iterdir()}

@@ -3,8 +3,8 @@
     python -m tests.batch.cluster [--jobs 20] [--folder FOLDER]
 
 A node is a slurmd of its own; it dies by SIGKILL, with everything that runs on it, and comes back half a minute later. Needs
-root and Debian's slurmctld, slurmd, slurm-client and munge; writes /etc/slurm/slurm.conf, where no other cluster may be described,
-and removes it again.
+root and Debian's slurmctld, slurmd, slurm-client and munge; writes /etc/slurm/slurm.conf, where no other cluster may be, and
+removes it again.
 """
 
 import argparse
