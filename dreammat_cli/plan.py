@@ -45,6 +45,9 @@ def command(
 
     JOBS is a .csv or .toml file, or a folder of jobs as for `make batch`. Every mistake in it is named, a line each.
     """
+    if common.dry_run:
+        show(common, {"would": "plan", "jobs": str(jobs)}, [f"would plan {jobs}"])
+        return
     from stages.batch.plan import plan
 
     for stage, text in further:
