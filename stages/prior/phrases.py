@@ -10,7 +10,7 @@ from itertools import pairwise
 
 from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.objects import OBJECTS
-from stages.prior.places import ANIMALS, GATHERS, ONCE, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
+from stages.prior.places import ANIMALS, DETAILS, GATHERS, ONCE, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
 from stages.prior.stuffs import BOARDS, COATINGS, GENERIC, KNOWN, PATTERNED, ROOFS
 from stages.prior.tokens import FOODS, PAINTED, Join, Token, singulars, tokens_of
 
@@ -196,7 +196,7 @@ def _begins(token: Token, now: Phrase) -> bool:
         if again and not now.placed:
             return False  # "a golem of cooled lava rock"
         return now.placed or bool(now.substance and (now.headed or (token.text in PAINTED and not now.coats)))
-    return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS))
+    return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS and text in PARTS))
 
 
 def _lacks(token: Token, now: Phrase) -> bool:
@@ -215,8 +215,8 @@ def _take(phrase: Phrase, token: Token) -> None:
             said.append(text)
     elif kind == "part" and phrase.thing and phrase.join is FIRST:
         return  # "a bicycle frame" is all frame
-    elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.substance and phrase.join.kind in ("", "and"):
-        return  # "a checkerboard marble plinth"
+    elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.says_what and phrase.join.kind in ("", "and"):
+        return  # "a checkerboard marble plinth", "blue and white gingham cushion"
     elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
         phrase.thing = text  # "striped cushion"
     elif kind in ("part", "shape") and (phrase.region is None or kind == "part" or text in PAINTS):
@@ -247,8 +247,11 @@ def _name(phrase: Phrase, text: str) -> None:
         phrase.substance = text
     elif KNOWN[old][0].look == "tartan" and _family(old) == _family(text):
         return  # "green tartan wool"
-    elif text in FIGURES and old not in (*GENERIC, *PAINTED):
-        return  # "a brass horn"
+    elif old in ("twill", "herringbone"):
+        phrase.substance = text  # "twill carbon fibre"
+    elif text in FIGURES and old not in (*GENERIC, *PAINTED):  # "a brass horn", "with an obsidian hide"
+        if phrase.join is not FIRST and phrase.region is None:
+            phrase.region, phrase.where = (PARTS["body"], "body") if text in COATS else (DETAILS, text)
     elif old == "molten":
         phrase.substance = text  # "molten gold"
     elif _family(old) == "rust" and _family(text) == "metal":
@@ -263,10 +266,13 @@ def _name(phrase: Phrase, text: str) -> None:
             phrase.colors = phrase.colors or [old]
 
 
-FIGURES = frozenset([
-    "horn", "antler", "shell", "seashell", "shells", "conch", "bone", "skull", "skulls", "skin", "scales", "feathers", "plumes",
+COATS = frozenset(["skin", "hide", "scales", "feathers", "fur", "hair", "pelt", "shell", "flesh"])
+"""Those of `FIGURES` that are all that one sees of a beast."""
+
+FIGURES = COATS | frozenset([
+    "horn", "antler", "seashell", "shells", "conch", "bone", "skull", "skulls", "plumes",
     "leaf", "leaves", "ivy", "vine", "vines", "comb", "log", "roots", "twigs", "crust", "ribbon", "ribbons", "rope", "cord",
-    "string", "netting", "card", "tusk", "tusks", "tooth", "teeth", "fangs", "claw", "claws", "hoof", "foliage", "fur", "hair",
+    "string", "netting", "card", "tusk", "tusks", "tooth", "teeth", "fangs", "claw", "claws", "hoof", "foliage",
     "mane", "grass",
 ])  # fmt: skip
 """Names of stuffs that are shapes of another stuff that stands before them."""
@@ -323,7 +329,7 @@ def _understood(phrases: list[Phrase]) -> list[Phrase]:
             result[-1] = phrase
         elif before and _ground_of(phrase, before):
             before.colors += phrase.colors  # "terrazzo, white base"
-        elif before and phrase.substance in CLEAR and not (phrase.region or before.region) and _glazes(phrase, before):
+        elif before and phrase.substance in CLEAR and _glazes(phrase, before):
             before.finish += phrase.finish or ["glossy"]
             before.colors += phrase.colors
         elif before and not phrase.says_what and not phrase.region:  # "bronze, polished"
@@ -381,13 +387,17 @@ def _painted(phrases: list[Phrase]) -> list[Phrase]:
     return [each for phrase in phrases for each in _paintings(phrase, phrases)]
 
 
-PAINTS = {"kintsugi": ("gold", [""]), "graffiti": ("spray paint", ["blue", "red", "yellow"])}
+PAINTS = {
+    "kintsugi": ("gold", [""]), "graffiti": ("spray paint", ["blue", "red", "yellow"]),
+    "sprinkles": ("glossy plastic", ["red", "yellow", "blue"]),
+    "rainbow": ("paint", ["red", "orange", "yellow", "green", "blue", "violet"]),
+}
 """Patterns that say of what they are, and of which colours where nobody says."""
 
 
 def _paintings(phrase: Phrase, beside: list[Phrase]) -> list[Phrase]:
     """A phrase; one that is a pattern of stuffs that everybody knows, as these, unless they are named beside it."""
-    stuff, colors = PAINTS.get(phrase.where, ("", [""]))
+    stuff, colors = PAINTS.get(phrase.where.split(" ")[0], ("", [""]))
     if phrase.substance or not stuff or not phrase.region:
         return [phrase]
     if any(p.substance == stuff and p.join.kind == "inlay" for p in beside):
@@ -545,7 +555,9 @@ def _covering(before: Phrase, phrase: Phrase) -> Phrase:
 ALONE = ("countertop", "tabletop", "table top", "desktop", "shelf", "door", "window", "helmet", "hat", "cushion", "screen")
 """Parts that are things of their own, too."""
 
-CLEAR = frozenset(["glaze", "varnish", "glazed", "clear coat", "clearcoat"])
+CLEAR = frozenset([
+    "glaze", "varnish", "glazed", "clear coat", "clearcoat", "clear lacquer", "clear varnish", "top coat", "clear resin",
+])  # fmt: skip
 """Coats that one sees through."""
 
 
@@ -557,7 +569,9 @@ def _ground_of(phrase: Phrase, before: Phrase) -> bool:
 
 def _glazes(glaze: Phrase, before: Phrase) -> bool:
     """Whether a clear coat is that of the whole: one without colour, or of one colour on what has none."""
-    return not glaze.colors or (not before.colors and all(word in COLORS for word in glaze.colors if is_hue(word)))
+    whole = not glaze.region and (not before.region or before.join is FIRST)
+    dyes = not before.colors and all(word in COLORS for word in glaze.colors if is_hue(word))
+    return whole and (not glaze.colors or dyes)
 
 
 WEARS = {

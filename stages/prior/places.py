@@ -60,7 +60,9 @@ PARTS = _table(
      "shoelaces, scabbard, sheath, clasp, lettering, rivet heads",
      Region("edges", 0.1, 0.04, 0.1)),
     ("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams, crevice, "
-     "carvings, engraved lines, creases, corners inside, cavities, pits", Region("crevices", 0.22, 0.08, 0.6)),
+     "carvings, between the scales, between its scales, between the bricks, between the stones, "
+     "between the planks, between the tiles, "
+     "engraved lines, creases, corners inside, cavities, pits", Region("crevices", 0.22, 0.08, 0.6)),
     ("inside, interior, lining, cavity, inner side", Region("hidden", 0.3, 0.05, 0.1)),
 )
 """Parts of things that name a region."""
@@ -98,6 +100,8 @@ SHAPES = _table(
     ("rain streaks, water streaks, water marks, streaks, drips, runs, streaked, drippings, dripping",
      Region("streaks", 0.2, 0.12, 0.8, 0.25)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
+    ("sprinkles, confetti", Region("spots", 0.25, 0.05)),
+    ("rainbow, rainbow stripes, rainbow striped, rainbow bands", Region("bands", 0.9, 0.2)),
     ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks, lines, kintsugi, "
      "lightning", Region("veins", 0.06, 0.22)),
 )  # fmt: skip

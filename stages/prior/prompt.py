@@ -429,7 +429,10 @@ def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
         first = replace(first, thing=first.thing or (thing if alone else ""))
     told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
     bare = bool(first.thing) and not (told or first.substance or first.unknown or first.animal)
-    if bare:
+    worn = next((p for p in over if p.animal and not (p.colors or p.region or p.substance)), None)
+    if bare and worn:  # "an egg with a leopard print"
+        first, over = replace(first, animal=worn.animal), [p for p in over if p is not worn]
+    elif bare:
         first, over = _of_what(first, over)
     if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
         over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS, rows, words
-from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET
+from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET, Region
 from stages.prior.sizes import TIMES
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF
 
@@ -20,7 +20,9 @@ FILLER = words(
     "photo of, render of, rendering of, picture of, image of, model of, photo, render, "
     "detailed texture, detailed, realistic, photorealistic, studio lighting, physically based, pbr, k, texture, material, "
     "surface, front view, side view, back view, top view, overhead view, high quality, masterpiece, beautiful, made of, "
-    "made from, made out of, made in, carved from, carved out of, cut from, built of, built from, a, an, the, is, are, at, "
+    "made from, made out of, made in, carved from, carved out of, cut from, cut out of, hewn from, hewn out of, moulded from, "
+    "molded from, cast in, cast from, forged from, spun from, knitted from, sculpted from, turned from, blown from, "
+    "as though, as if, built of, built from, a, an, the, is, are, at, "
     "its, some, all, from, entirely, looks like, made, of it, "
     "texturing, finish, finished, print, pattern, patterned, style, both, each, that, which, it, bits of, pieces of, "
     "layer of, many, thick, thin, around, along, growing, on it, all over, lies, lie, made up of, made entirely of, "
@@ -84,11 +86,13 @@ def _joins(kind: str, text: str, beneath: bool = False) -> dict[str, Join]:
 
 
 JOINS = {
-    **_joins("with", "with, plus, has, have, having, featuring, including, but with, but, complete with, whose, where, while, "
-             "after, "
+    **_joins("with", "with, plus, has, have, having, featuring, including, but with, complete with, held by, "
+             "held together by, held together with, reinforced with, secured with, secured by, fastened with, fixed with, "
+             "tied with, joined with, joined by, whose, where, while, after, "
              "and whose, adorned with, decorated with, embellished with, fitted with, equipped with, accented with, "
              "accented by, with accents of, as well as, along with, together with, set off by, set off with, "
              "finished off with"),
+    **_joins("comma", "but"),
     **_joins("and", "and"),
     **_joins("paint", "painted in, painted with, lacquered in, lacquered with, enamelled in, enameled in, finished in, "
              "finished with, sprayed in, sprayed with, powder-coated in, powder coated in, rendered in, glazed in, "
@@ -389,12 +393,17 @@ def _resolved(found: list[Token]) -> list[Token]:
                 token = Token("color", token.text)
         if token.kind == "color" and token.article and not ahead and token.text in OBJECTS:
             token = Token("thing", token.text)  # "an orange"
-        elif token.kind == "thing" and token.text in KNOWN and not names:
+        elif token.kind == "thing" and token.text in KNOWN and (not names or _stands_before(ahead, behind)):
             token = Token("substance", token.text)
         elif token.kind == "thing" and token.text in PARTS and (result or ahead):
             token = Token("part", token.text, PARTS[token.text])
         result.append(token)
     return result
+
+
+def _stands_before(ahead: list[Token], behind: list[Token]) -> bool:
+    """Whether what may be a stuff stands right before a thing of which no stuff is said yet: "a meteorite pendant"."""
+    return ahead[0].kind == "thing" and not any(t.kind == "substance" for t in (*ahead, *behind))
 
 
 FOODS = frozenset(["bread", "cheese", "chocolate", "salt", "meat", "honeycomb", "honey"])
@@ -454,6 +463,7 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("join", JOINS)
     enter("part", {f"{word} {place}": PARTS[place] for word in PLACED for place in PARTS} | {"on top of it": PARTS["top"]})
     enter("filler", [f"{word} {place}" for word in ("from the", "from its", "down from the") for place in PARTS])
+    enter("part", {f"up to {the}{place}": Region("below", 0.45) for the in ("", "the ", "its ") for place in PARTS})
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
     for known, *others in rows("spellings.tsv"):
         table |= {other: table[known] for other in words(others[0]) if other not in table}

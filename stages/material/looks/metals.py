@@ -12,10 +12,12 @@ from stages.material.patterns import (
     Array,
     Spectrum,
     cells,
+    exceeds,
     fading,
     fbm,
     heap,
     line,
+    lost,
     marks,
     masked,
     noise,
@@ -180,6 +182,36 @@ def tarnished(at: Place, kind: Metal) -> Look:
     return Look(shade(color, 0.05 * grain), rough, 1.0 - 0.2 * thick, 8e-6 * grain + 1.5e-5 * thick)
 
 
+def layered(at: Place, kind: Metal = METALS["steel"]) -> Look:
+    """Pattern-welded steel, folded, ground and etched: contours of its layers, the softer ones eaten dark."""
+    bent = warped(at, 0.004, 0.03, 1)
+    depth = 0.013 * fbm(bent, Spectrum(0.075, 0.03, 0.8), 2) + 0.0022 * fbm(bent, Spectrum(0.016, 0.004, 0.9), 3)
+    folds = Place(np.stack([depth, 0 * depth, 0 * depth]).astype(np.float32), at.uv, at.face, at.footprint, seed=at.seed)
+    sheets = Spectrum(0.0042, 0.0007, 0.75, tails=0.1)
+    hard = exceeds(fbm(folds, sheets, 4), 0.0, 0.35, lost(folds, sheets))
+    grain = fbm(at, Spectrum(0.002, 0.0003, 1.1, tails=0.3, patch=0.3), 5)
+    color = mix(palette(0.5 + 0.3 * grain, "#45484c", "#5a5d61"), palette(0.5 + 0.2 * grain, *kind.colors), hard)
+    look = worked(at, kind, 0.3, 1.2e-5 * hard + 2e-6 * grain, 0.4 * grain)
+    rough = np.clip(np.asarray(look.roughness) + 0.14 - 0.2 * hard, 0.05, 1)
+    return look._replace(color=shade(color, 0.05 * grain), roughness=rough)
+
+
+TEMPER = ("#cfc6b4", "#dcb56a", "#b36a3c", "#7a4468", "#4a4a98", "#4a7cae", "#8fb4bc")
+"""Of steel and titanium under an oxide that grows thicker: straw, brown, purple, blue."""
+SHEEN = ("#14161c", "#1c3a44", "#245038", "#5a5a2a", "#64402e", "#5a2a4a", "#34306a", "#1a2646", "#14161c")
+"""Of a thin film on black, as it grows thicker."""
+
+
+def tempered(at: Place, colors: tuple[str, ...] = TEMPER, turns: float = 0.22) -> Look:
+    """Metal under a film that interferes with light: its colours follow how hot it was, or how thick the film lies."""
+    film = fbm(warped(at, 0.01, 0.06, 1), Spectrum(0.2, 0.0025, 0.45, patch=0.2), 2)
+    grain = fbm(at.flat, Spectrum(0.003, 0.0003, 1.1, (12, 1, 1), tails=0.3), 3)
+    fine = fbm(at, Spectrum(0.0024, 0.0003, 1.2, tails=0.3, patch=0.3), 4)
+    thick = 0.5 + turns * film + 0.03 * grain
+    look = worked(at, METALS["titanium"], 0.24, 1e-6 * grain, 0.5 * grain)
+    return look._replace(color=shade(palette(thick, *colors), 0.09 * grain + 0.05 * fine))
+
+
 CAST_IRON = METALS["iron"]._replace(colors=("#58595c", "#6c6d70", "#818284"), tarnish=("#33302e", "#4b443e"), dull=0.55)
 
 FINISHES: dict[str, Callable[..., Look]] = {
@@ -193,6 +225,7 @@ LOOKS |= {
     **{f"tarnished {metal}": partial(tarnished, kind=METALS[metal]) for metal in ("copper", "brass", "silver")},
     "cast iron": partial(cast, kind=CAST_IRON), "galvanised steel": galvanised,
     "chrome": partial(polished, kind=METALS["steel"]),
+    "damascus steel": layered, "heat tint": tempered, "iridescent": partial(tempered, colors=SHEEN, turns=0.3),
     "gold leaf": partial(foil, kind=METALS["gold"]), "foil": partial(foil, kind=METALS["aluminium"]),
 }  # fmt: skip
 METRES = dict.fromkeys(LOOKS, 0.35)

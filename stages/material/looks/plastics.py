@@ -4,11 +4,13 @@ import numpy as np
 
 from stages.material.look import Look, averaged, mix, palette, shade, tint
 from stages.material.patterns import (
+    STONES,
     Array,
     Spectrum,
     cells,
     fading,
     fbm,
+    heap,
     line,
     lost,
     marks,
@@ -174,9 +176,28 @@ def carbon_fibre(at: Place) -> Look:
     return Look(shade(color, 0.1 * strand + 0.2 * scuffs), np.clip(rough, 0.03, 1), 0.0, 2e-5 * cloth.height * cloth.seen)
 
 
+def forged_carbon(at: Place) -> Look:
+    """Chopped carbon tow pressed in resin: flat chips lying every way, each striped along its own fibres."""
+    chip = heap(warped(at, 0.0012, 0.01, 1), 0.011, CHIPS, 2)
+    angle = chip.random(2) * np.float32(np.pi)
+    u, v = at.flat.p[0], at.flat.p[1]
+    across = (u * np.cos(angle) + v * np.sin(angle) + chip.random(3)).astype(np.float32)
+    fibres = Place(np.stack([across, 0 * u, 0 * u]), at.uv, at.face, at.footprint, seed=at.seed)
+    strand = fbm(fibres, Spectrum(0.0012, 0.00025, 0.7, tails=0.3), 3)
+    sheen = (chip.random(1) - 0.5) * chip.shown
+    scuffs, worn = _handled(at, 0.5)
+    color = averaged(0.42 + 1.5 * sheen + 0.22 * strand, 0.43 * (1 - chip.shown), *CARBON)
+    rough = 0.2 + 0.03 * np.clip(worn, -1, 3) - 0.12 * sheen + 0.2 * scuffs + 0.02 * strand
+    return Look(shade(color, 0.1 * strand + 0.2 * scuffs), np.clip(rough, 0.03, 1), 0.0, 8e-6 * sheen)
+
+
+CHIPS = STONES._replace(radius=0.95, vary=0.5, sharp=0.7, thick=0.1, tilt=0.02)
+"""Flat chips of all sizes."""
+
 LOOKS = {
     "glossy plastic": glossy_plastic, "plastic": plastic, "rubber": rubber, "foam": foam, "paint": paint,
     "car paint": car_paint, "painted wood": painted_wood, "glass": glass, "wax": wax, "carbon fibre": carbon_fibre,
+    "forged carbon": forged_carbon,
 }  # fmt: skip
 METRES = {"glossy plastic": 0.2, "plastic": 0.2, "rubber": 0.25, "foam": 0.35, "paint": 0.4, "car paint": 0.35,
-          "painted wood": 0.4, "glass": 0.3, "wax": 0.2, "carbon fibre": 0.2}  # fmt: skip
+          "painted wood": 0.4, "glass": 0.3, "wax": 0.2, "carbon fibre": 0.2, "forged carbon": 0.2}  # fmt: skip
