@@ -69,24 +69,24 @@ RARE = {
 SHADES = {
     "oatmeal": "#d6c8ae", "biscuit": "#dcc49a", "mocha": "#6e4f3a", "latte": "#b99a76", "espresso": "#3c2a21",
     "cappuccino": "#a68868", "greige": "#b8ac9c", "putty": "#c2b6a0", "anthracite": "#33373b", "graphite": "#3d4043",
-    "claret": "#6e1423", "merlot": "#561a24", "raisin": "#3f2a2c", "fig": "#532d3b", "damson": "#4b2a40", "sea": "#3c8d94",
-    "sky": "#82bce6", "stormy": "#4f6272", "storm": "#4f6272", "fog": "#c3c7c8", "mist": "#cdd5d4", "smoke": "#848884",
-    "dove grey": "#9c9a98", "dove gray": "#9c9a98", "ash grey": "#b2b5ac", "pebble": "#a49c90", "eau de nil": "#c9d8b4",
+    "claret": "#6e1423", "merlot": "#561a24", "damson": "#4b2a40", 
+    "stormy": "#4f6272", 
+    "dove grey": "#9c9a98", "dove gray": "#9c9a98", "ash grey": "#b2b5ac", "eau de nil": "#c9d8b4",
     "robin egg blue": "#6fc7c8", "robin egg": "#6fc7c8", "wedgwood blue": "#5b7fae", "delft blue": "#2b4a8c",
-    "petrol blue": "#1d4e5c", "laurel": "#5c6e4e", "bay": "#5c3a24", "paprika": "#b0391f", "cayenne": "#97301c",
+    "petrol blue": "#1d4e5c", "laurel": "#5c6e4e", "paprika": "#b0391f", "cayenne": "#97301c",
     "chilli": "#b3201c", "chilli red": "#b3201c", "tobacco": "#6b4a2b", "cognac": "#9a5a2a", "whiskey": "#b06a2c",
     "whisky": "#b06a2c", "butterscotch": "#d49a4a", "toffee": "#8a5a34", "fudge": "#8c6246", "nutmeg": "#8a5c3c",
-    "flax": "#dccb94", "flaxen": "#dccb94", "champagne": "#e8d6b4", "vanilla": "#f2e6c4", "custard": "#f0dc96",
+    "flaxen": "#dccb94", "champagne": "#e8d6b4", "vanilla": "#f2e6c4", "custard": "#f0dc96",
     "buttermilk": "#f6e8c0", "nude": "#ddb9a0", "flamingo": "#f48c8c", "raspberry": "#b01c4c", "blackberry": "#38223a",
-    "blueberry": "#3f4a7c", "pomegranate": "#a4202c", "wisteria": "#a890d0", "ink": "#1a2238", "inky": "#1a2238",
-    "ink blue": "#1c2a4e", "acid green": "#a8c81c", "acid yellow": "#dce01c", "citron": "#cfc32a", "flame": "#e2582a",
-    "sunset": "#f08050", "ember": "#c04a20", "raven": "#14161a", "blonde": "#dcbc80", "blond": "#dcbc80",
+    "blueberry": "#3f4a7c", "pomegranate": "#a4202c", "wisteria": "#a890d0", "inky": "#1a2238",
+    "ink blue": "#1c2a4e", "acid green": "#a8c81c", "acid yellow": "#dce01c", "citron": "#cfc32a", 
+    "blonde": "#dcbc80", "blond": "#dcbc80",
     "rosewood red": "#65000b",
-    "sea foam": "#9fe2bf", "seafoam": "#9fe2bf", "arctic white": "#f4f8fa", "bone white": "#e8e2d2", "milk": "#f4f0e6",
+    "sea foam": "#9fe2bf", "seafoam": "#9fe2bf", "arctic white": "#f4f8fa", "bone white": "#e8e2d2", 
     "crimson": "#c01430", "cerulean": "#2a7fc0", "vermilion": "#e03c28", "vermillion": "#e03c28", "ultramarine": "#2a24a4",
     "chartreuse": "#a4dc1c", "mauve": "#b090b8", "taupe": "#8a7c70", "auburn": "#7e3a20", "tawny": "#b06a30", "drab": "#8a7c5a",
     "dun": "#a08e74", "fuschia": "#d82890", "ocher": "#c08428", "maize": "#f0cc60", "creamy": "#f0e6c8", "rosy": "#e49a98",
-    "military": "#4b5320", "field drab": "#6c541e", "desert sand": "#d8bd94", "earthy": "#7a5c40",
+    "field drab": "#6c541e", "earthy": "#7a5c40",
     "limed": "#d6ccb8", "cerused": "#d2c6b0", "pickled": "#dacfbc", "fumed": "#5c4330", "smoked": "#4a4038",
     "ebonised": "#26211d", "ebonized": "#26211d", "anodised black": "#202124", "gunmetal grey": "#53565a",
     "moss grey": "#8c9078", "blackened": "#2a2826", "bleached white": "#eae6da",
@@ -99,10 +99,18 @@ SHADES = {
 }
 """Names that training never draws: those of paint cards and cloth, of seas and skies, and what joiners do to wood."""
 
+LIKENED = {
+    "sea": "#3c8d94", "sky": "#82bce6", "storm": "#4f6272", "fog": "#c3c7c8", "mist": "#cdd5d4",
+    "smoke": "#848884", "flame": "#e2582a", "sunset": "#f08050", "ember": "#c04a20", "raven": "#14161a",
+    "ink": "#1a2238", "milk": "#f4f0e6", "bay": "#5c3a24", "fig": "#532d3b", "raisin": "#3f2a2c",
+    "pebble": "#a49c90", "desert sand": "#d8bd94", "military": "#4b5320", "flax": "#dccb94",
+}
+"""Things that lend their colour where words say that it is theirs, "the colour of a stormy sea", and not elsewhere."""
+
 TREATMENTS = frozenset(["limed", "cerused", "pickled", "fumed", "smoked", "ebonised", "ebonized", "bleached white"])
 """Those of them that say what wood looks like, whatever its own colour."""
 
-COLORS = COMMON | RARE | {name: value for name, value in SHADES.items() if name not in COMMON | RARE}
+COLORS = LIKENED | SHADES | RARE | COMMON
 
 COMMON_SHARE = 0.6
 """Share of the common names among all that are drawn."""

@@ -55,7 +55,7 @@ PARTS = _table(
     ("left half, left side, left", Region("left", 0.5)), ("right half, right side, right", Region("right", 0.5)),
     ("belly, underbelly, bottom side", Region("down", 0.3)),
     ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "
-     "edge trim, gilding, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
+     "edge trim, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
      "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching, laces, "
      "shoelaces, scabbard, sheath, clasp, lettering, rivet heads",
      Region("edges", 0.1, 0.04, 0.1)),

@@ -6,7 +6,6 @@ same tables and explains other words by a dictionary, and look like the substanc
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cache
-from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -19,9 +18,11 @@ from stages.material.look import from_oklab, to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Part, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, TREATMENTS, changed, rgb
+from stages.prior.grammar import split
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
-from stages.prior.phrases import Join, Phrase, is_hue, split
+from stages.prior.order import ROOFING, ordered
+from stages.prior.phrases import Phrase, is_hue
 from stages.prior.places import (
     ANIMALS,
     CORRODES,
@@ -33,7 +34,6 @@ from stages.prior.places import (
     LAYERED,
     ONCE,
     PARTS,
-    PARTS_OF,
     PEELED,
     PEELS,
     POROUS,
@@ -105,7 +105,7 @@ class Reading:
         rest, said = measured(prompt)
         phrases = self._phrases(rest)
         self._metres = self._metres or said or _usual_size(phrases)
-        base, over = _ordered(phrases)
+        base, over = ordered(phrases)
         layers = self._base_layers(base, {phrase.region for phrase in over})
         coat = layers.pop(0).coat
         for phrase in over:
@@ -125,7 +125,7 @@ class Reading:
         for those of which words say what they are. Args: said: regions of which words speak."""
         made = split(OBJECTS[base.thing].made) if base.thing and not (base.substance or base.unknown or base.animal) else []
         if len(made) > 1 and not base.colors:
-            inner, over = _ordered(made)
+            inner, over = ordered(made)
             inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
             coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
             parts = [layer for part in over if part.region not in said for layer in self._over(part, coat, inner)]
@@ -222,6 +222,8 @@ class Reading:
             if not phrase.colors and (kin or usual.substance == phrase.substance):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
             named = "painted wood" if phrase.substance in WOODEN and _gaudy(phrase) else phrase.substance
+            if CORRODES.get(KNOWN[named][0].look) == "verdigris" and _greenish(phrase):
+                named, phrase = "verdigris", replace(phrase, colors=[])  # "copper gone green"
             return self._of(stuff(named, bool(phrase.colors)), phrase)
         if made:
             inner = split(made)[0]
@@ -379,80 +381,6 @@ class Reading:
         return replace(coat, metres=self._metres or METRES.get(coat.look, 1.0))
 
 
-LARGE = 0.5
-"""Share of a part that may be the base of what else is named."""
-
-
-def _ordered(phrases: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
-    """The base, and what lies over it from below: "spots on tan", "paint peeling off wood" name the upper one first."""
-    for after in phrases[1:]:
-        if after.join.kind == "below" and (after.coats or after.substance in GATHERS):
-            after.join = Join("over")  # "iron under peeling paint"
-    base = 0
-    while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
-        base += 1
-    upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
-    return _placed(phrases[base], [*reversed(upper), *phrases[base + 1 :]])
-
-
-def _stands(first: Phrase, second: Phrase) -> bool:
-    """Whether a thing stands on its own part, "a dragon on a wooden base", rather than a stuff on what is beneath."""
-    if second.join.kind in ("peel", "through"):
-        return False  # "paint peeling off a door"
-    part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
-    thing = bool(first.thing and first.substance) and second.join.kind == "on" and not second.thing
-    return (part or thing) and not first.region and first.substance not in GATHERS
-
-
-def _placed(first: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
-    """The base among phrases: that of the body, where one says so, or of the largest part, where each is one; a covering is
-    the base of what has no stuff of its own."""
-    if first.where in PARTS and over and all(p.where in PARTS and p.says_what for p in over):
-        parts = [first, *over]
-        largest = max(parts, key=lambda p: p.region.share if p.region else 0.0)
-        if largest is not first and first.region and first.region.share < LARGE:
-            first, over = largest, [p for p in parts if p is not largest]
-    if first.thing and not (first.substance or first.region) and all(p.where in PARTS and p.substance for p in over):
-        frame = next((p for p in over if p.where in FRAMES), None)
-        if frame and any(p.where in SEATS for p in over):  # "a chair: oak frame, velvet seat"
-            whole = replace(frame, thing=first.thing, region=None, where="", join=first.join)
-            return whole, [p for p in over if p is not frame]
-    body = next((k for k, p in enumerate(over) if p.region and p.region.kind == "all" and p.says_what), None)
-    if body is not None and over[body].color_only and first.substance and not (first.colors or first.region):
-        first, over, body = replace(first, colors=over[body].colors), [*over[:body], *over[body + 1 :]], None
-    if body is not None:
-        thing = first.thing
-        alone = bool(thing) and not (first.substance or first.colors or first.unknown)
-        if not (alone or first.region or first.substance in (*GATHERS, *ROOFING)):
-            first = replace(first, region=Region("above", 0.4))
-        first, over = over[body], [*([] if alone else [first]), *over[:body], *over[body + 1 :]]
-        first = replace(first, thing=first.thing or (thing if alone else ""))
-    told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
-    bare = bool(first.thing) and not (told or first.substance or first.unknown or first.animal)
-    worn = next((p for p in over if p.animal and not (p.colors or p.region or p.substance)), None)
-    if bare and worn:  # "an egg with a leopard print"
-        first, over = replace(first, animal=worn.animal), [p for p in over if p is not worn]
-    elif bare:
-        first, over = _of_what(first, over)
-    if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
-        over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
-    region, other = (over[0].region if over else None), first.region
-    if region and other and over[0].where in ("above", "below") and {region.kind, other.kind} == {"above", "below"}:
-        over[0] = replace(over[0], region=region._replace(share=1 - other.share))
-    for phrase in over:
-        shown = phrase.shows
-        if not (shown and shown.substance and set(phrase.weather) & PEELS) or phrase.region:
-            continue
-        usual = split(OBJECTS[first.thing].made)[0] if first.thing else Phrase()
-        own = first.substance or usual.substance
-        if own and not first.colors and _family(shown) == KNOWN[own][0].family:
-            first = replace(first, substance=shown.substance, colors=shown.colors)  # "wooden, peeling paint showing grey oak"
-    if first.thing in PARTS_OF:
-        places = PARTS_OF[first.thing]
-        over = [replace(p, region=places.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
-    return first, over
-
-
 def _scaled(region: Region, much: float) -> Region:
     """A region that covers less or more than usual."""
     return region if much == 1 else region._replace(share=min(0.9, region.share * much))
@@ -484,8 +412,13 @@ def _gaudy(phrase: Phrase) -> bool:
     return bool(np.hypot(*chroma) > GREYISH and (chroma[1] < 0.6 * np.hypot(*chroma)))
 
 
-FRAMES, SEATS = ("frame", "framework"), ("seat", "cushion", "cushions", "upholstery", "backrest")
-"""Parts of furniture: what the rest of it is made like, and what lies on that."""
+def _greenish(phrase: Phrase) -> bool:
+    """Whether a phrase's colour is green or turquoise."""
+    if not any(map(is_hue, phrase.colors)):
+        return False
+    red, green, blue = _color(phrase)
+    return green > 1.15 * red and green > 0.85 * blue
+
 
 SOFT = ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching")
 """Parts that are of cloth where words name their colour alone."""
@@ -495,50 +428,6 @@ DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "
 
 GREYISH = 0.04
 """Chroma in OKLab of a colour that a bare metal may have."""
-
-ROOFING = frozenset(["thatch", "thatched", "roof tiles", "shingles", "slate tiles", "roof slates"])
-"""What lies on roofs when nobody says where."""
-
-
-def _covers(phrase: Phrase) -> bool:
-    """Whether what covers a thing is all that one sees of it: leather does, moss does not."""
-    gathers = ONCE.get(phrase.substance, phrase.substance) in GATHERS
-    return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
-
-
-def _of_what(thing: Phrase, over: list[Phrase]) -> tuple[Phrase, list[Phrase]]:
-    """A thing with the stuff that is said after it: "armchair upholstered in velvet", "a gnome in the snow, terracotta"."""
-    beneath = [p.join.kind in ("on", "over") and p.join.beneath and bool(p.substance or p.unknown) for p in over]
-    ground = beneath.index(True) if any(beneath) else 0
-    laid = (p.substance in GATHERS or p.coats or p.part or p.where in SHAPES for p in over[:ground])
-    if ground and not over[ground].region and all(laid):
-        said = replace(over[ground], thing=thing.thing, join=Join(""), weather=[*thing.weather, *over[ground].weather])
-        paints = [replace(p, join=Join("over")) for p in over[:ground] if p.coats]
-        others = [p for p in over[:ground] if not p.coats]
-        return said, [*paints, *others, *over[ground + 1 :]]  # "a mailbox, icicles and frost on blue paint"
-    for k, phrase in enumerate(over):
-        named = phrase.join.kind == "comma" and bool(phrase.substance) and not phrase.part
-        if k and not (over[k - 1].substance in GATHERS or over[k - 1].weather):
-            break
-        whole = _covers(phrase) if named or not k else False
-        elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
-        if elsewhere or not (whole or (not k and _upholsters(phrase, thing))):
-            continue
-        if thing.colors and not named:
-            continue
-        dyed = phrase.colors or phrase.coats or any(word in COLORS for word in phrase.substance.split())
-        colors = phrase.colors if dyed else thing.colors  # "a red jar, porcelain"
-        weather = [*thing.weather, *phrase.weather]
-        said = replace(phrase, thing=thing.thing, join=Join(""), colors=colors, weather=weather)
-        return said, [*over[:k], *over[k + 1 :]]
-    return thing, over
-
-
-def _upholsters(phrase: Phrase, thing: Phrase) -> bool:
-    """Whether what a thing is upholstered in is all that one sees of it: of an armchair, not of a chair."""
-    usual = split(OBJECTS[thing.thing].made)[0]
-    return phrase.join.kind == "seat" and bool(usual.substance) and _family(usual) in ("fabric", "leather")
-
 
 def _usual_size(phrases: list[Phrase]) -> float | None:
     """Metres of the thing that is named first, if any, as large as words say."""

@@ -8,7 +8,7 @@ from itertools import takewhile
 from string import ascii_lowercase
 from typing import Any, NamedTuple
 
-from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS
+from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS, LIKENED
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS, rows, words
 from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET, Region
@@ -21,7 +21,8 @@ FILLER = words(
     "detailed texture, detailed, realistic, photorealistic, studio lighting, physically based, pbr, k, texture, material, "
     "surface, front view, side view, back view, top view, overhead view, high quality, masterpiece, beautiful, made of, "
     "made from, made out of, made in, carved from, carved out of, cut from, cut out of, hewn from, hewn out of, moulded from, "
-    "molded from, cast in, cast from, forged from, spun from, knitted from, sculpted from, turned from, blown from, "
+    "molded from, cast in, cast from, forged from, spun from, woven from, woven out of, knitted from, sculpted from, "
+    "turned from, blown from, "
     "as though, as if, built of, built from, a, an, the, is, are, at, "
     "its, some, all, from, entirely, looks like, made, of it, "
     "texturing, finish, finished, print, pattern, patterned, style, both, each, that, which, it, bits of, pieces of, "
@@ -65,7 +66,7 @@ DEGREES = {
 
 DENIALS = words(
     "without, without any, no, not, never, free of, minus, excluding, instead of, rather than, lacking, devoid of, non, "
-    "neither, "
+    "neither, nothing, "
     "other than, than, no longer"
 )
 """Words that say that what follows is not there."""
@@ -107,7 +108,7 @@ JOINS = {
     **_joins("partly", "partly covered in, partly covered with, partially covered in, partially covered with, stained with, "
              "mixed with, splattered with, spattered with, splashed with, stained by, smeared with, mottled with, "
              "patched with"),
-    **_joins("spots", "speckled with, dotted with, flecked with, spotted with, sprinkled with"),
+    **_joins("spots", "speckled with, freckled with, peppered with, dotted with, flecked with, spotted with, sprinkled with"),
     **_joins("stud", "studded with, riveted with"), **_joins("inlay", "inlaid with, inlaid in, veined with, shot through with, "
              "repaired with, repaired in, mended with, mended in, laced with"),
     **_joins("swirl", "marbled with, swirled with, swirling with, swirled into, swirling into, swirling through, "
@@ -128,7 +129,8 @@ JOINS = {
     **_joins("show", "showing, showing through to, revealing, exposing, worn down to, worn away to, chipped down to, "
         "chipped to, rubbed down to, "
              "worn through to, that shows, that reveals, worn to reveal, chipped away to reveal, scraped down to, "
-             "worn to, sanded to, rubbed to, stripped to, scraped to, peeling to reveal, flaking to reveal, to reveal, "
+             "worn to, sanded to, scoured to, ground to, rubbed to, stripped to, scraped to, peeling to reveal, "
+             "flaking to reveal, to reveal, "
              "to expose, to show, to uncover, uncovering, baring, to bare, letting show, "
              "peeled back to"),
     **_joins("through", "showing through, shining through, visible through, peeking through, visible under, "
@@ -228,7 +230,7 @@ def _dyed(found: list[Token]) -> list[Token]:
     for token in found:
         if token.kind != "dyed":
             kept.append(token)
-        elif kept and kept[-1].kind == "substance":
+        elif kept and (kept[-1].kind == "substance" or kept[-1].text in LIKENED):
             kept[-1] = Token("color", kept[-1].text)
     return kept
 
@@ -379,6 +381,8 @@ def _resolved(found: list[Token]) -> list[Token]:
         ahead = _run(found[number + 1 :])
         behind = _run(reversed(result))
         names = {t.kind for t in ahead} & {"substance", "thing"}
+        if token.text == "left" and ahead and ahead[0].kind in ("finish", "weather"):
+            continue  # "left unglazed"
         if token.kind == "thing" and ahead and ahead[0].text in COLORS and any(t.kind == "thing" for t in result):
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
@@ -449,7 +453,8 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("thing", OBJECTS)
     enter("part", PARTS)
     enter("shape", SHAPES)
-    enter("color", [w for w in (*COLORS, *CHANGES, *LEANINGS) if w in COMMON or (w not in KNOWN and w not in OBJECTS)])
+    other = {*KNOWN, *OBJECTS, *LIKENED}
+    enter("color", [word for word in (*COLORS, *CHANGES, *LEANINGS) if word in COMMON or word not in other])
     enter("finish", {**FINISHES, **FINISHES_METAL, **FINISH_LOOKS})
     enter("weather", {**WEATHER, **FADED, **WET})
     enter("animal", ANIMALS)

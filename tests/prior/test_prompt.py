@@ -13,10 +13,10 @@ from stages.material.recipe import Coat, Recipe
 from stages.material.substances import ALONG_GRAIN, LOOKS, METRES
 from stages.prior.colors import rgb
 from stages.prior.explain import HEADINGS, explained, parts, table
+from stages.prior.grammar import split
 from stages.prior.model import Prior, load_prior
 from stages.prior.names import SUBSTANCES
 from stages.prior.objects import OBJECTS
-from stages.prior.phrases import split
 from stages.prior.places import ANIMALS, GATHERS, JOINED, ONCE, PARTS, SHAPES, WEATHER
 from stages.prior.prompt import Reading, read_prompt
 from stages.prior.stuffs import FAMILY_LOOKS, FINISH_LOOKS, KNOWN, LOOK_OF, look_of

@@ -1,0 +1,202 @@
+"""A prompt cut into phrases.
+
+The grammar is that of a buyer's list, not of English: a phrase is a run of words about one substance. Words between phrases
+join them ("with", "covered in", "peeling off"); parts ("sole", "rim") and patterns ("stripes") say where a phrase lies. What
+no table knows, a dictionary may explain by colours; the rest is kept as unknown. """
+
+from collections.abc import Callable, Container, Mapping, Sequence
+
+from stages.prior.context import PAINTS, understood
+from stages.prior.objects import OBJECTS
+from stages.prior.phrases import FIRST, Phrase, family, is_hue
+from stages.prior.places import DETAILS, PARTS, SHAPES, Region
+from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
+from stages.prior.tokens import PAINTED, Join, Token, tokens_of
+
+
+def split(
+    prompt: str,
+    explained: Mapping[str, Sequence[str]] | None = None,
+    matters: Callable[[str], bool] = bool,
+    real: Container[str] = (),
+) -> list[Phrase]:
+    """The phrases of a prompt, in its order; at least one.
+
+    Args:
+        explained: a dictionary, as `Vocabulary` has. matters: whether a word that no table knows may mean a material. real:
+        words that are no slips of the pen.
+    """
+    phrases = [Phrase()]
+    much, within = 1.0, False
+    tokens = [
+        token if token.kind != "unknown" or matters(token.text) else token._replace(kind="name")
+        for token in tokens_of(prompt, explained or {}, real)
+    ]
+    for number, token in enumerate(tokens):
+        now, following = phrases[-1], tokens[number + 1] if number + 1 < len(tokens) else Token("end", "")
+        if token.kind == "degree":
+            much = token.value
+            continue
+        if _stands_for_itself(token, now, following) and len(phrases) == 1:
+            token = Token("thing", token.text)
+        if token.kind == "weather":
+            now.amount[token.text] = much
+        elif token.kind in ("substance", "postfix") and much != 1:
+            now.much = much
+        much = much if token.kind in ("join", "color", "finish") else 1.0
+        join = _join_of(token, now, following)
+        if join is None:
+            if token.text == "of":
+                now.closed = True
+            if token.kind == "join" and token.value.kind == "peel" and "peeling" not in now.weather:
+                now.weather.append("peeling")
+            within = token.text == "in" or (within and token.kind not in ("join", "postfix", "comma", "half"))
+            if token.kind in ("join", "postfix", "comma", "half"):
+                continue
+            if _begins(token, now) and not (within and _lacks(token, now)):
+                now = Phrase(Join("paint" if token.text in PAINTED else "with"))
+                phrases.append(now)
+            _take(now, token)
+        elif now.empty:
+            now.join = join if len(phrases) > 1 else now.join
+        else:
+            free = now.region is None or now.where in SHAPES
+            if join.kind in ("above", "below") and free and following.kind in ("comma", "end", "join"):
+                now.region, now.where = Region(join.kind, 0.5), token.text  # "gold above, oak below"
+                continue
+            phrases.append(Phrase(join))
+    return understood([p for p in phrases if not p.empty]) or [Phrase()]
+
+
+def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
+    """How the next phrase joins, or None where the token joins nothing."""
+    if token.kind == "comma":
+        return None if now.empty else Join("comma")
+    if token.kind == "postfix":
+        if (now.color_only or now.substance) and now.join.kind == "and" and token.text in SHAPES:
+            now.region, now.where = SHAPES[token.text], token.text  # "red and white striped canvas"
+            return None
+        if not now.says_what and token.text in SHAPES:
+            now.region, now.where = SHAPES[token.text], token.text  # "striped canvas"
+            return None
+        if following.kind == "part":  # "leather-wrapped grip"
+            return None
+        return Join(token.value, True) if now.says_what and not now.animal else None
+    if token.kind == "half":
+        return Join("half")
+    if token.kind != "join":
+        return None
+    if token.value.kind == "show" and following.kind in ("comma", "end") and now.says_what:
+        now.join = token.value  # "peeling paint, gray wood showing"
+        return None
+    if token.value.kind in ("peel", "through") and following.kind in ("comma", "end", "join"):
+        return None  # "blue paint peeling off, ..."
+    if token.value.kind in ("show", "through") and following.kind == "part" and now.says_what:
+        return None  # "dark steel showing at the edges"
+    if token.value.kind == "of":
+        return Join("of", True) if now.region and now.says_what else None
+    if token.value.kind == "in":
+        return Join("on", True) if now.says_what and now.where in SHAPES else None
+    if token.value.kind == "to":
+        return Join("fade") if now.says_what else None
+    if token.value.kind in ("on", "over") and following.kind == "part" and now.says_what:
+        return None  # "moss on the roof"
+    return token.value  # type: ignore[no-any-return]
+
+
+
+def _stands_for_itself(token: Token, now: Phrase, following: Token) -> bool:
+    """Whether what may be a part is the thing itself: "a helmet in olive drab"."""
+    return token.kind == "part" and token.text in OBJECTS and not now.says_what and following.text not in (",", ":", "", "and")
+
+
+def _begins(token: Token, now: Phrase) -> bool:
+    """Whether a token begins a phrase although no word joins it to the one before: "gold rim white porcelain"."""
+    text = token.text
+    if token.kind == "substance":
+        if now.where in SHAPES and not now.substance:
+            return False  # "black and white checkerboard tiles", "red gingham cotton"
+        again = bool(now.substance) and text in (*GENERIC, *BOARDS) and family(text) == family(now.substance)
+        if again and not now.placed:
+            return False  # "a golem of cooled lava rock"
+        return now.placed or bool(now.substance and (now.headed or (token.text in PAINTED and not now.coats)))
+    return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS and text in PARTS))
+
+
+def _lacks(token: Token, now: Phrase) -> bool:
+    """Whether a token says of a phrase what it does not say yet: "grips in charcoal", "handles in oak"."""
+    return not (now.substance if token.kind == "substance" else any(map(is_hue, now.colors)))
+
+
+def _take(phrase: Phrase, token: Token) -> None:
+    """Put a token where it belongs in a phrase."""
+    kind, text = token.kind, token.text
+    if kind == "substance":
+        _name(phrase, text)
+    elif kind in ("color", "finish", "weather", "unknown", "size"):
+        said = phrase.of_kind(kind)
+        if text not in said:
+            said.append(text)
+    elif kind == "part" and phrase.thing and phrase.join is FIRST:
+        return  # "a bicycle frame" is all frame
+    elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.says_what and phrase.join.kind in ("", "and"):
+        return  # "a checkerboard marble plinth", "blue and white gingham cushion"
+    elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
+        phrase.thing = text  # "striped cushion"
+    elif kind in ("part", "shape") and (phrase.region is None or kind == "part" or text in PAINTS):
+        phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
+    elif kind == "thing" and not phrase.closed:
+        phrase.thing, phrase.headed = text, bool(phrase.substance)  # the last of a run says what it is: "school bus"
+    elif kind == "name" and (phrase.substance or phrase.colors) and not phrase.region:
+        phrase.part = text
+    elif kind == "animal":
+        phrase.animal = text
+
+
+ROUGHENED = ("frosted", "matte")
+"""Words of finish that are part of a stuff's name."""
+
+
+def _name(phrase: Phrase, text: str) -> None:
+    """A substance's name, which may stand after another: "oak planks", "stone bricks", "gold fabric", "pine wood"."""
+    old = phrase.substance
+    first = text.split(" ")[0]
+    if " " in text and first in ROUGHENED and first not in phrase.finish:
+        phrase.finish.append(first)
+    if text.endswith((" wall", " walls", " sole")) and phrase.region is None:
+        phrase.where = "sole" if text.endswith("sole") else "walls"
+        phrase.region = PARTS[phrase.where]
+    phrase.boards = phrase.boards or text in BOARDS
+    if not old:
+        phrase.substance = text
+    elif KNOWN[old][0].look == "tartan" and family(old) == family(text):
+        return  # "green tartan wool"
+    elif old in ("twill", "herringbone"):
+        phrase.substance = text  # "twill carbon fibre"
+    elif text in FIGURES and old not in (*GENERIC, *PAINTED):  # "a brass horn", "with an obsidian hide"
+        if phrase.join is not FIRST and phrase.region is None:
+            phrase.region, phrase.where = (PARTS["body"], "body") if text in COATS else (DETAILS, text)
+    elif old == "molten":
+        phrase.substance = text  # "molten gold"
+    elif family(old) == "rust" and family(text) == "metal":
+        return  # "verdigris copper"
+    elif old.endswith("plated"):
+        return  # "silver-plated copper"
+    elif text in BOARDS or (text in GENERIC and family(old) == family(text)):
+        return  # the first says which
+    else:
+        phrase.substance = text
+        if family(old) != family(text) or text in PATTERNED:
+            phrase.colors = phrase.colors or [old]
+
+
+COATS = frozenset(["skin", "hide", "scales", "feathers", "fur", "hair", "pelt", "shell", "flesh"])
+"""Those of `FIGURES` that are all that one sees of a beast."""
+
+FIGURES = COATS | frozenset([
+    "horn", "antler", "seashell", "shells", "conch", "bone", "skull", "skulls", "plumes",
+    "leaf", "leaves", "ivy", "vine", "vines", "comb", "log", "roots", "twigs", "crust", "ribbon", "ribbons", "rope", "cord",
+    "string", "netting", "card", "tusk", "tusks", "tooth", "teeth", "fangs", "claw", "claws", "hoof", "foliage",
+    "mane", "grass",
+])  # fmt: skip
+"""Names of stuffs that are shapes of another stuff that stands before them."""

@@ -1,0 +1,169 @@
+"""Which phrase of a prompt is the base, and what lies over it."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+from stages.prior.colors import COLORS
+from stages.prior.grammar import split
+from stages.prior.objects import OBJECTS
+from stages.prior.phrases import Phrase, family
+from stages.prior.places import GATHERS, ONCE, PARTS, PARTS_OF, PEELS, SHAPES, Region
+from stages.prior.stuffs import KNOWN
+from stages.prior.tokens import Join
+
+Order = tuple[Phrase, list[Phrase]]
+"""The base, and what lies over it, from below."""
+
+
+def ordered(phrases: list[Phrase]) -> Order:
+    """The base, and what lies over it from below: "spots on tan", "paint peeling off wood" name the upper one first."""
+    for after in phrases[1:]:
+        if after.join.kind == "below" and (after.coats or after.substance in GATHERS):
+            after.join = Join("over")  # "iron under peeling paint"
+    base = 0
+    while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
+        base += 1
+    upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
+    first, over = phrases[base], [*reversed(upper), *phrases[base + 1 :]]
+    for step in (_largest, _framed, _of_body, _told_after, _either_side, _bared, _in_its_places):
+        first, over = step(first, over)
+    return first, over
+
+
+def _stands(first: Phrase, second: Phrase) -> bool:
+    """Whether a thing stands on its own part, "a dragon on a wooden base", rather than a stuff on what is beneath."""
+    if second.join.kind in ("peel", "through"):
+        return False  # "paint peeling off a door"
+    part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
+    thing = bool(first.thing and first.substance) and second.join.kind == "on" and not second.thing
+    return (part or thing) and not first.region and first.substance not in GATHERS
+
+
+LARGE = 0.5
+"""Share of a part that may be the base of what else is named."""
+
+
+def _largest(first: Phrase, over: list[Phrase]) -> Order:
+    """Where each phrase is a part, the largest is the base: "gold rim, white porcelain body"."""
+    if first.where in PARTS and over and all(p.where in PARTS and p.says_what for p in over):
+        parts = [first, *over]
+        largest = max(parts, key=lambda p: p.region.share if p.region else 0.0)
+        if largest is not first and first.region and first.region.share < LARGE:
+            return largest, [p for p in parts if p is not largest]
+    return first, over
+
+
+FRAMES, SEATS = ("frame", "framework"), ("seat", "cushion", "cushions", "upholstery", "backrest")
+"""Parts of furniture: what the rest of it is made like, and what lies on that."""
+
+
+def _framed(first: Phrase, over: list[Phrase]) -> Order:
+    """A frame is the base of what sits in it: "a chair: oak frame, velvet seat"."""
+    if first.thing and not (first.substance or first.region) and all(p.where in PARTS and p.substance for p in over):
+        frame = next((p for p in over if p.where in FRAMES), None)
+        if frame and any(p.where in SEATS for p in over):
+            whole = replace(frame, thing=first.thing, region=None, where="", join=first.join)
+            return whole, [p for p in over if p is not frame]
+    return first, over
+
+
+ROOFING = frozenset(["thatch", "thatched", "roof tiles", "shingles", "slate tiles", "roof slates"])
+"""What lies on roofs when nobody says where."""
+
+
+def _of_body(first: Phrase, over: list[Phrase]) -> Order:
+    """The body, where one is spoken of, is the base, and what was named first lies on top of it."""
+    at = next((k for k, p in enumerate(over) if p.region and p.region.kind == "all" and p.says_what), None)
+    if at is None:
+        return first, over
+    body, others = over[at], [*over[:at], *over[at + 1 :]]
+    if body.color_only and first.substance and not (first.colors or first.region):
+        return replace(first, colors=body.colors), others  # "a lacquer bowl, red inside, black outside"
+    alone = bool(first.thing) and not (first.substance or first.colors or first.unknown)
+    if alone:
+        return replace(body, thing=body.thing or first.thing), others
+    if not (first.region or first.substance in (*GATHERS, *ROOFING)):
+        first = replace(first, region=Region("above", 0.4))
+    return body, [first, *others]
+
+
+def _told_after(first: Phrase, over: list[Phrase]) -> Order:
+    """A thing whose stuff is said after it, if at all."""
+    told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
+    if not first.thing or told or first.substance or first.unknown or first.animal:
+        return first, over
+    worn = next((p for p in over if p.animal and not (p.colors or p.region or p.substance)), None)
+    if worn:  # "an egg with a leopard print"
+        return replace(first, animal=worn.animal), [p for p in over if p is not worn]
+    return _on_ground(first, over) or _of_what(first, over)
+
+
+def _on_ground(thing: Phrase, over: list[Phrase]) -> Order | None:
+    """The stuff on which all that was named before lies, if any does: "a mailbox, icicles and frost on blue paint"."""
+    beneath = [p.join.kind in ("on", "over") and p.join.beneath and bool(p.substance or p.unknown) for p in over]
+    at = beneath.index(True) if any(beneath) else 0
+    laid = all(p.substance in GATHERS or p.coats or p.part or p.where in SHAPES for p in over[:at])
+    if not at or over[at].region or not laid:
+        return None
+    said = replace(over[at], thing=thing.thing, join=Join(""), weather=[*thing.weather, *over[at].weather])
+    paints = [replace(p, join=Join("over")) for p in over[:at] if p.coats]
+    return said, [*paints, *[p for p in over[:at] if not p.coats], *over[at + 1 :]]
+
+
+def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
+    """A thing with the stuff that is said after it: "armchair upholstered in velvet", "a gnome in the snow, terracotta"."""
+    for k, phrase in enumerate(over):
+        named = phrase.join.kind == "comma" and bool(phrase.substance) and not phrase.part
+        if k and not (over[k - 1].substance in GATHERS or over[k - 1].weather):
+            break
+        whole = _covers(phrase) if named or not k else False
+        elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
+        if elsewhere or not (whole or (not k and _upholsters(phrase, thing))) or (thing.colors and not named):
+            continue
+        dyed = phrase.colors or phrase.coats or any(word in COLORS for word in phrase.substance.split())
+        colors = phrase.colors if dyed else thing.colors  # "a red jar, porcelain"
+        weather = [*thing.weather, *phrase.weather]
+        said = replace(phrase, thing=thing.thing, join=Join(""), colors=colors, weather=weather)
+        return said, [*over[:k], *over[k + 1 :]]
+    return thing, over
+
+
+def _covers(phrase: Phrase) -> bool:
+    """Whether what covers a thing is all that one sees of it: leather does, moss does not."""
+    gathers = ONCE.get(phrase.substance, phrase.substance) in GATHERS
+    return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
+
+
+def _upholsters(phrase: Phrase, thing: Phrase) -> bool:
+    """Whether what a thing is upholstered in is all that one sees of it: of an armchair, not of a chair."""
+    usual = split(OBJECTS[thing.thing].made)[0]
+    return phrase.join.kind == "seat" and bool(usual.substance) and family(usual.substance) in ("fabric", "leather")
+
+
+def _either_side(first: Phrase, over: list[Phrase]) -> Order:
+    """Two that lie above and below each other share the whole: "gold above, oak below"."""
+    if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
+        over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
+    region, other = (over[0].region if over else None), first.region
+    if region and other and over[0].where in ("above", "below") and {region.kind, other.kind} == {"above", "below"}:
+        over[0] = replace(over[0], region=region._replace(share=1 - other.share))
+    return first, over
+
+
+def _bared(first: Phrase, over: list[Phrase]) -> Order:
+    """What a coat lets see where it peels is the base: "a wooden door, peeling paint showing grey oak"."""
+    for phrase in over:
+        shown = phrase.shows
+        if not (shown and shown.substance and set(phrase.weather) & PEELS) or phrase.region:
+            continue
+        usual = split(OBJECTS[first.thing].made)[0] if first.thing else Phrase()
+        own = first.substance or usual.substance
+        if own and not first.colors and family(shown.substance) == family(own):
+            first = replace(first, substance=shown.substance, colors=shown.colors)
+    return first, over
+
+
+def _in_its_places(first: Phrase, over: list[Phrase]) -> Order:
+    """Parts of a thing that has them elsewhere than others."""
+    places = PARTS_OF.get(first.thing, {})
+    return first, [replace(p, region=places.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
