@@ -44,7 +44,7 @@ def choose_quality(
     some = points[windows(points, seed)]
     if len(some.n) == 0:
         return QUALITY["standard"].scaled(low), 0.0
-    few, one = (measured(scene, some, lights, QUALITY["standard"].scaled(f), seed) for f in FACTORS)
+    few, one = measured(scene, some, lights, [QUALITY["standard"].scaled(f) for f in FACTORS], seed)
     fall = float(np.clip(math.log(max(few, 1e-9) / max(one, 1e-9)) / math.log(FACTORS[1] / FACTORS[0]), *FALL))
     factor = low
     while one * factor**-fall > target and factor < high:
@@ -55,17 +55,19 @@ def choose_quality(
     return QUALITY["standard"].scaled(factor), expected
 
 
-def measured(scene: Scene, points: GBuffer, lights: list[Environment], quality: Quality, seed: int) -> float:
-    """Error of a quality at some points, percent: of the worst light map under the worst environment."""
-    worst = 0.0
+def measured(
+    scene: Scene, points: GBuffer, lights: list[Environment], qualities: list[Quality], seed: int
+) -> list[float]:
+    """Error of each quality at some points, percent: of the worst light map under the worst environment."""
+    worst = [0.0] * len(qualities)
     for first in range(0, len(lights), MAX_LIGHTS):
         light_set = cached_light_set(tuple(lights[first : first + MAX_LIGHTS]))
         truth = integrate(scene, points, light_set, TRUTH, seed + 1)
-        found = integrate(scene, points, light_set, quality, seed)
-        for a, b in zip(found, truth, strict=True):
-            error = reinhard(light_maps(a)) - reinhard(light_maps(b))
-            worst = max(worst, float(torch.sqrt(error.double().square().mean((0, 2))).max()))
-    return worst * 100
+        for i, quality in enumerate(qualities):
+            for a, b in zip(integrate(scene, points, light_set, quality, seed), truth, strict=True):
+                error = reinhard(light_maps(a)) - reinhard(light_maps(b))
+                worst[i] = max(worst[i], 100 * float(torch.sqrt(error.double().square().mean((0, 2))).max()))
+    return worst
 
 
 def windows(points: GBuffer, seed: int) -> NDArray[np.int64]:

@@ -73,7 +73,7 @@ def test_light_maps_agree_with_the_reference_bounce_included(corner: Scene) -> N
 
 
 def test_standard_rays_are_enough_for_eight_bits(corner: Scene) -> None:
-    points, light = scenes.view_of(corner, 48), scenes.sunny_light(200.0)
+    points, light = scenes.view_of(corner, 32), scenes.sunny_light(200.0)
     few, many = (blender_light_maps(corner, points, [light], q, 0)[0] for q in (QUALITY["standard"], CONVERGED))
     assert float((reinhard(few) - reinhard(many)).abs().mean()) < 2 / 255
 

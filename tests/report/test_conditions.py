@@ -18,7 +18,7 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "CONVERGED", module.Quality(768, 256, extra=False, smooth=False))
     monkeypatch.setattr(module, "QUADRATURE_PIXELS", 4)
     monkeypatch.setattr(module.steps, "PIXELS", 4)
-    rows = module.report_conditions(prep, tmp_path / "out", ReportOptions(size=64, env=("studio", "clear_sky")))
+    rows = module.report_conditions(prep, tmp_path / "out", ReportOptions(size=48, env=("studio", "clear_sky")))
     with (tmp_path / "out" / "conditions.csv").open() as stream:
         written = list(csv.DictReader(stream))
     assert len(written) == len(rows)

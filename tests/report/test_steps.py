@@ -30,7 +30,8 @@ def test_monte_carlo_averages_to_the_quadrature(monkeypatch: pytest.MonkeyPatch)
     assert ((stacked.mean(0) - exact).abs() < 4 * noise + 0.02 * exact.abs()).all()
 
 
-def test_transport_is_faster_and_more_exact() -> None:
+def test_transport_is_faster_and_more_exact(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steps, "PIXELS", 64)
     scene = scenes.box_in_corner()
     points = scenes.view_of(scene, 48)
     rows = steps.measure(scene, points, light_set([scenes.sunny_light()]), 0)
