@@ -115,8 +115,16 @@ def lookup(radiance, directions):  # type: ignore[no-untyped-def]
 def bilinear(radiance, direction, found):  # type: ignore[no-untyped-def]
     """Write the bilinear radiance along one unit direction, (3,), into `found`, (3,)."""
     height, width, _ = radiance.shape
-    u = (0.5 - math.atan2(direction[1], direction[0]) / (2 * math.pi)) * width - 0.5
-    v = math.acos(min(max(direction[2], -1.0), 1.0)) / math.pi * height - 0.5
+    u = (0.5 - math.atan2(direction[1], direction[0]) / (2 * math.pi)) * width
+    v = math.acos(min(max(direction[2], -1.0), 1.0)) / math.pi * height
+    bilinear_at(radiance, u, v, found)
+
+
+@numba.njit(error_model="numpy", cache=True, nogil=True)
+def bilinear_at(radiance, u, v, found):  # type: ignore[no-untyped-def]
+    """Write the bilinear radiance at column u and row v, whose texels' centres are at +0.5, into `found`, (3,)."""
+    height, width, _ = radiance.shape
+    u, v = u - 0.5, v - 0.5
     column, row = math.floor(u), math.floor(v)
     fu, fv = u - column, v - row
     left, right = int(column) % width, (int(column) + 1) % width

@@ -245,22 +245,22 @@ def split(radiance: NDArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
 
 def _pyramid(base: NDArray) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
-    level = np.zeros((*base.shape[:2], CHANNELS))
-    level[..., : base.shape[-1]] = base
+    level, used = base.astype(np.float64), base.shape[-1]
     levels, start = [], [0]
     while True:
-        levels.append(_bordered(level).reshape(-1, CHANNELS).astype(np.float32))
+        levels.append(np.zeros(((len(level) + 2) ** 2, CHANNELS), np.float32))
+        levels[-1][:, :used] = _bordered(level).reshape(-1, used)
         if len(level) == 1:
             return np.concatenate(levels), np.array(start, np.int64)
         start.append(start[-1] + len(levels[-1]))
         half = len(level) // 2
-        level = level.reshape(half, 2, half, 2, CHANNELS).mean((1, 3))
+        level = level.reshape(half, 2, half, 2, used).mean((1, 3))
 
 
 def _bordered(square: NDArray) -> NDArray:
     """One texel added all around: over an edge of the octahedral square the sphere goes on mirrored along that edge."""
     size = len(square)
-    result = np.empty((size + 2, size + 2, CHANNELS))
+    result = np.empty((size + 2, size + 2, square.shape[-1]))
     result[1:-1, 1:-1] = square
     result[0, 1:-1], result[-1, 1:-1] = square[0, ::-1], square[-1, ::-1]
     result[1:-1, 0], result[1:-1, -1] = square[::-1, 0], square[::-1, -1]

@@ -5,7 +5,7 @@ import math
 import numba
 import numpy as np
 
-from stages.light.environment import lookup
+from stages.light.environment import bilinear_at
 
 
 @numba.njit(inline="always", error_model="numpy", cache=True)
@@ -38,6 +38,21 @@ def square_to_direction(u, v):  # type: ignore[no-untyped-def]
     return (x if u >= 0 else -x), (y if v >= 0 else -y), z
 
 
+@numba.njit(inline="always", error_model="numpy", cache=True)
+def square_to_texel(u, v, height, width):  # type: ignore[no-untyped-def]
+    """[0, 1]^2 to the column and row of a latitude-longitude light, and z: where `lookup` reads the light along
+    `square_to_direction`, without sines to be undone again."""
+    u, v = 2 * u - 1, 2 * v - 1
+    a, b = abs(u), abs(v)
+    distance = 1 - (a + b)
+    radius = 1 - abs(distance)
+    turn = ((b - a) / radius + 1) / 8 if radius > 0 else 0.0  # of the azimuth within its quarter, in whole turns
+    turn = turn if u >= 0 else 0.5 - turn
+    z = 1 - radius * radius
+    z = z if distance >= 0 else -z
+    return (0.5 - (turn if v >= 0 else -turn)) * width, math.acos(min(max(z, -1.0), 1.0)) / math.pi * height, z
+
+
 @numba.njit(error_model="numpy", cache=True, nogil=True)
 def texel_directions(size):  # type: ignore[no-untyped-def]
     """Direction of each texel centre of a size x size square: x, y, z, (size, size) each."""
@@ -65,22 +80,19 @@ def octahedral(radiance, size, oversample):  # type: ignore[no-untyped-def]
                 a, b = row // reach + 1, column // reach + 1
                 coarse[a - 1 : a + 2, b - 1 : b + 2] = True
     coarse[:, :2] = coarse[:, -3:] = True  # the seam
-    w = np.empty((oversample * oversample, 3))
+    total, found = np.empty(3), np.empty(3)
     for row in range(size):
         for column in range(size):
-            x, y, z = square_to_direction((column + 0.5) / size, (row + 0.5) / size)
-            u = (0.5 - math.atan2(y, x) / (2 * math.pi)) * width
-            v = math.acos(min(max(z, -1.0), 1.0)) / math.pi * height
+            u, v, z = square_to_texel((column + 0.5) / size, (row + 0.5) / size, height, width)
             polar = abs(z) > 1 - 8.0 / size  # here a texel spans many columns
             if not polar and not coarse[int(v) // reach + 1, int(u) // reach + 1]:
                 continue
+            total[:] = 0
             for a in range(oversample):
                 for b in range(oversample):
-                    i = a * oversample + b
-                    w[i, 0], w[i, 1], w[i, 2] = square_to_direction(
-                        (column + (b + 0.5) / oversample) / size, (row + (a + 0.5) / oversample) / size
-                    )
-            values = lookup(radiance, w)
-            for c in range(3):
-                result[row, column, c] = values[:, c].mean()
+                    x, y = (column + (b + 0.5) / oversample) / size, (row + (a + 0.5) / oversample) / size
+                    u, v, _ = square_to_texel(x, y, height, width)
+                    bilinear_at(radiance, u, v, found)
+                    total += found
+            result[row, column] = total / (oversample * oversample)
     return result

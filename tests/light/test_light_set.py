@@ -5,7 +5,7 @@ import pytest
 
 from stages.core.color import luminance
 from stages.light import light_set as module
-from stages.light.environment import Environment, directions_of_texels
+from stages.light.environment import Environment, directions_of_texels, lookup
 from stages.light.light_set import CELLS, CUT, FINE, LARGEST_CELL, LightSet, Texels, light_set, split
 from stages.light.octahedral import direction_to_square, octahedral, square_to_direction, texel_directions
 from stages.light.transport import share_out
@@ -42,6 +42,14 @@ def test_octahedral_map_is_inverted_and_keeps_area() -> None:
         assert square_to_direction(u, v) == pytest.approx(tuple(direction), abs=1e-9)
     z = np.array([square_to_direction(u, v)[2] for u, v in generator.random((20_000, 2))])
     assert np.mean(z > 0.5) == pytest.approx(0.25, abs=0.01)  # a cap of height 0.5 is a quarter of the sphere
+
+
+def test_the_square_holds_the_mean_of_what_look_ups_along_its_directions_find() -> None:
+    pixels = np.random.default_rng(5).random((24, 48, 3)).astype(np.float32)
+    found = octahedral(pixels, 16, 3)
+    fine = [[square_to_direction((x + 0.5) / 48, (y + 0.5) / 48) for x in range(48)] for y in range(48)]
+    expected = lookup(pixels, np.array(fine).reshape(-1, 3)).reshape(16, 3, 16, 3, 3).mean((1, 3))
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("row, column", [(0, 5), (3, 0), (31, 63), (16, 32), (15, 31), (20, 63)])
