@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from dreammat_cli.whole import Whole
+from tests.processes import Command
 
 OK, USAGE, INPUT, ARTIFACT, OUTPUT = 0, 2, 3, 4, 5
 
@@ -18,8 +19,9 @@ TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 def dreammat(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run the command in a process of its own."""
-    command = [sys.executable, "-m", "dreammat_cli", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, timeout=300)
+    result = Command(arguments, cwd).done()
+    assert result is not None
+    return result
 
 
 def expect_error(result: subprocess.CompletedProcess[str], code: int, *words: str) -> None:

@@ -10,39 +10,28 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from dreammat_cli.main import cli
 from tests import campaign
 from tests.pipeline import cube_sphere, fingerprint, stages
-
-
-def heed_interrupts() -> None:
-    """A shell's background jobs, and so this test's process, may have been told to ignore Ctrl-C."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-def start(arguments: list[str]) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "dreammat_cli", *arguments, "-q"]
-    return subprocess.Popen(command, stderr=subprocess.PIPE, preexec_fn=heed_interrupts)
+from tests.processes import Command
 
 
 def run(arguments: list[str]) -> float:
     """Run to the end. Returns: seconds."""
     begin = time.perf_counter()
-    process = start(arguments)
-    _, error = process.communicate(timeout=300)
-    assert process.returncode == 0, error.decode()
+    result = Command([*arguments, "-q"]).done()
+    assert result and result.returncode == 0, result
     return time.perf_counter() - begin
 
 
-def kill_after(arguments: list[str], seconds: float, how: signal.Signals) -> int:
-    """Run, send a signal after some seconds. Returns: the exit code."""
-    process = start(arguments)
-    try:
-        process.communicate(timeout=seconds)
-    except subprocess.TimeoutExpired:
-        process.send_signal(how)
-        process.communicate(timeout=120)
-    return process.returncode
+def kill_after(arguments: list[str], seconds: float, how: signal.Signals) -> None:
+    """Run, send a signal after some seconds, and wait for the end."""
+    command = Command([*arguments, "-q"])
+    if command.done(seconds) is None:
+        command.send(how)
+        assert command.done(120)
 
 
 @pytest.fixture(scope="module")
@@ -64,9 +53,8 @@ def test_the_asset_is_complete(whole: tuple[Path, dict[str, float]]) -> None:
 def test_every_stage_is_then_up_to_date(whole: tuple[Path, dict[str, float]]) -> None:
     before = fingerprint(whole[0])
     for arguments in stages(whole[0]).values():
-        command = [sys.executable, "-m", "dreammat_cli", *arguments]
-        result = subprocess.run(command, capture_output=True, text=True, check=True, timeout=300)
-        assert "up to date" in result.stdout
+        result = CliRunner().invoke(cli, arguments)
+        assert result.exit_code == 0 and "up to date" in result.stdout
     assert fingerprint(whole[0]) == before
 
 
@@ -79,7 +67,8 @@ def test_one_call_gives_the_same_bytes(whole: tuple[Path, dict[str, float]], tmp
     for name, first in (("prep", "--texture-size"), ("conditions", "--views"), ("distill", "--steps"), ("bake", "--size")):
         options = commands[name][commands[name].index(first) :]
         further += ["--with", name, " ".join(options)]
-    run(["run", str(folder / "mesh.obj"), "--prompt", "red plastic", "-o", str(folder), *further])
+    asked = ["run", str(folder / "mesh.obj"), "--prompt", "red plastic", "-o", str(folder), *further, "-q"]
+    subprocess.run([sys.executable, "-m", "dreammat_cli", *asked], check=True, timeout=300)
     assert fingerprint(folder) == fingerprint(whole[0])
 
 
@@ -98,16 +87,15 @@ def test_killed_at_random_and_run_again_ends_in_the_same_bytes(
 
 
 def test_an_interrupt_says_how_to_go_on(whole: tuple[Path, dict[str, float]], tmp_path: Path) -> None:
-    cube_sphere(tmp_path / "mesh.obj")
-    run(stages(tmp_path)["prep"])
-    process = start([*stages(tmp_path)["conditions"], "--views", "2000"])
+    shutil.copy(whole[0] / "prep.npz", tmp_path)
+    command = Command([*stages(tmp_path)["conditions"], "--views", "2000", "-q"])
     deadline = time.monotonic() + 120
     while not (tmp_path / "conditions" / "view_001").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    _, error = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert error.decode().strip() == "error: interrupted; the same command continues where it stopped"
+    command.send(signal.SIGINT)
+    result = command.done(60)
+    assert result and result.returncode == 130
+    assert result.stderr.strip() == "error: interrupted; the same command continues where it stopped"
 
 
 def test_damaged_artefacts_are_refused_in_one_line_or_read_alike(
