@@ -1,8 +1,9 @@
 """Speed against error of the ambient occlusion that `bake` writes, beside float64 that knows no rays."""
 
 import csv
+import math
 import time
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +11,11 @@ from numpy.typing import NDArray
 
 from stages.bake.occlusion import both_sides, lookouts_of, occlusion_map
 from stages.bake.raster import Surface
-from stages.bake.stage import Subject
+from stages.bake.stage import Subject, subjects
 from stages.core.artifact import load_npz, written_atomically
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
+from stages.core.texture_sets import texture_sets
 from stages.light.openness import reference_openness
 from stages.report.options import OcclusionReportOptions
 
@@ -36,29 +38,41 @@ class OcclusionRow:
 def report_occlusion(
     prep: Path, out: Path, options: OcclusionReportOptions, progress: Progress = silent
 ) -> list[OcclusionRow]:
-    """Measure on a mesh, on its first texture set; write occlusion.csv and occlusion.png into a folder.
+    """Measure on a mesh, all of its texture sets; write occlusion.csv and occlusion.png into a folder.
 
     Raises: ArtifactError.
     """
     mesh = load_npz(prep, PREP)
-    subject = Subject.of(prep, mesh, options.size)
-    on_chart = subject.touched.triangle >= 0
-    count = int(on_chart.sum())
-    chosen = np.random.default_rng(options.seed).choice(count, min(options.texels, count), replace=False)
-    progress("reference", 0, 1)
-    truth = reference_occlusion(subject, subject.touched.where(on_chart)[chosen])
-    compile_kernels(subject)
-    rows, found = [], np.ones(on_chart.shape, np.float32)
-    for rays in sorted(options.rays):
-        wall, cpu = time.perf_counter(), time.process_time()
-        found = occlusion_map(subject.scene, subject.touched, mesh["charts"], rays, subject.open, progress)
-        seconds = time.perf_counter() - wall, time.process_time() - cpu
-        error = 100 * np.abs(found[on_chart][chosen] - truth)
-        rows.append(OcclusionRow(rays, *seconds, float((error**2).mean() ** 0.5), float(np.quantile(error, 0.99)), error.max()))
+    sets = [replace(of, size=options.size) for of in texture_sets(mesh.provenance)]
+    rays = sorted(options.rays)
+    seconds, errors, maps = np.zeros((len(rays), 2)), [[np.zeros(0)] for _ in rays], []
+    for subject in subjects(prep, mesh, sets):
+        on_chart = subject.touched.triangle >= 0
+        wanted = math.ceil(options.texels * subject.set.share)
+        chosen = np.random.default_rng(options.seed).permutation(int(on_chart.sum()))[:wanted]
+        progress("reference", 0, 1)
+        truth = reference_occlusion(subject, subject.touched.where(on_chart)[chosen])
+        compile_kernels(subject)
+        found = np.ones(on_chart.shape, np.float32)
+        for row, count in enumerate(rays):
+            before = np.array([time.perf_counter(), time.process_time()])
+            found = occlusion_map(subject.scene, subject.touched, mesh["charts"], count, subject.open, progress)
+            seconds[row] += [time.perf_counter(), time.process_time()] - before
+            errors[row].append(100 * np.abs(found[on_chart][chosen] - truth))
+        maps.append(np.where(on_chart, found, np.nan))
+    rows = [OcclusionRow(*of) for of in zip(rays, *seconds.T.tolist(), *summed(errors), strict=True)]
     out.mkdir(parents=True, exist_ok=True)
     write_csv(out / "occlusion.csv", rows)
-    picture(out / "occlusion.png", rows, np.where(on_chart, found, np.nan), f"{prep}: {count} texels of {options.size}²")
+    shown = f"{prep}: {sum(int(np.isfinite(one).sum()) for one in maps)} texels of {options.size}²"
+    picture(out / "occlusion.png", rows, np.concatenate(maps, 1), shown)
     return rows
+
+
+def summed(errors: list[list[NDArray]]) -> tuple[list[float], list[float], list[float]]:
+    """Root of the mean square, 99th percentile and largest of each row's errors."""
+    each = [np.concatenate(row) for row in errors]
+    roots = [float(np.square(row).mean() ** 0.5) for row in each]
+    return roots, [float(np.quantile(row, 0.99)) for row in each], [float(row.max()) for row in each]
 
 
 def reference_occlusion(subject: Subject, surface: Surface) -> NDArray:
