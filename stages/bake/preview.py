@@ -1,9 +1,9 @@
 """preview.png: the baked asset as an engine would draw it, from eight sides; below, its maps without light.
 
-Geometry, textures and light are sampled at four points a pixel. Textures and normal maps are averaged over what each point
-stands for, as seen by the camera; where the normals of a patch differ, the patch is rougher by as much. The light is the
-project's own transport under an environment that distillation never saw (`stages.bake.studio`). The picture is sRGB
-without a tone curve: Blender's "Standard" view, three.js without tone mapping.
+Geometry, textures and light are sampled at four points a pixel, the object's outline at more. Textures and normal maps
+are averaged over what each point stands for, as seen by the camera; where the normals of a patch differ, the patch is
+rougher by as much. The light is the project's own transport under an environment that distillation never saw
+(`stages.bake.studio`). The picture is sRGB without a tone curve: Blender's "Standard" view, three.js without tone mapping.
 """
 
 import math
@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
 from stages.bake.raster import Layout, touched_texels
 from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
@@ -37,6 +38,9 @@ MAP_BACKDROP = (0.16, 0.18, 0.22)
 RAYS = Quality(lobe=16, light=6, extra=False)
 """Rays that a point traces, a quarter of its pixel."""
 
+OUTLINE = 6
+"""Points along each edge of a pixel through which the object's outline may run."""
+
 GAP = 2
 """Pixels between the maps of several sets."""
 
@@ -51,16 +55,24 @@ STRETCH = 4.0
 class Picture:
     """One view at two samples along each edge of a pixel.
 
-    alpha: (2H, 2W) bool. color: (2H, 2W, 3) linear. material: (2H, 2W, 5) albedo, roughness, metallic.
+    alpha: (2H, 2W) bool. color: (2H, 2W, 3) linear. material: (2H, 2W, 5) albedo, roughness, metallic. covered: (H, W, 1)
+    share of each pixel that the object covers.
     """
 
     alpha: NDArray[np.bool_]
     color: NDArray[np.float32]
     material: NDArray[np.float32]
+    covered: NDArray[np.float32]
 
     def over(self, background: NDArray[np.float32]) -> NDArray[np.float32]:
         """The picture at one value a pixel, over a background (H, W, 3) or wider to broadcast. Returns: linear."""
-        return over(self.alpha, self.color, background)
+        return self.shown(self.color, background)
+
+    def shown(self, values: NDArray[np.float32], background: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Values (2H, 2W, C) of the object's samples at one a pixel, over a background. Returns: (H, W, C)."""
+        hit = _halve(self.alpha[..., None].astype(np.float32))
+        mean = _halve(np.where(self.alpha[..., None], values, 0)) / np.maximum(hit, 1 / 4)  # a quarter is one sample
+        return mean * self.covered + (1 - self.covered) * background
 
 
 def contact_sheet(look: "Look", size: int, progress: Progress) -> NDArray[np.float32]:
@@ -150,7 +162,27 @@ def draw_view(look: Look, light: Environment, c2w: NDArray, size: int) -> Pictur
             drawn = _draw(look, light, directions[wide[0], wide[1]], c2w, 2 * np.tan(FOV_Y / 2) / across)
             for whole, part in zip((alpha, color, material), drawn, strict=True):
                 whole[inner] = part[kept]
-    return Picture(alpha[..., 0] > 0, color, material)
+    return Picture(alpha[..., 0] > 0, color, material, covered(look.scene, alpha, c2w))
+
+
+def covered(scene: Scene, alpha: NDArray[np.float32], c2w: NDArray) -> NDArray[np.float32]:
+    """Share of each pixel that a mesh covers, by more points where its outline runs.
+
+    Args:
+        alpha: (2S, 2S, 1), 1 where a sample hits.
+    Returns:
+        (S, S, 1); 0 where no sample hits, since nothing is known of what there is.
+    """
+    share = _halve(alpha)
+    nearby = (share > 0) & (minimum_filter(share, (3, 3, 1)) < 1)
+    row, column, _ = np.nonzero(nearby)
+    offset = (np.arange(OUTLINE) + 0.5) / OUTLINE
+    x, y = (np.tan(FOV_Y / 2) * (2 * (at[:, None] + offset) / len(share) - 1) for at in (column, row))
+    grid = np.broadcast_arrays(x[:, None, :], -y[:, :, None], -1.0)  # (R, OUTLINE, OUTLINE) each
+    rays = np.stack(grid, -1).reshape(-1, 3) @ c2w[:3, :3].T
+    hit = scene.hidden(np.broadcast_to(c2w[:3, 3], rays.shape), rays)
+    share[nearby] = hit.reshape(len(row), OUTLINE**2).mean(1)
+    return share
 
 
 def _draw(look: Look, light: Environment, directions: NDArray, c2w: NDArray, step: float) -> tuple[NDArray, NDArray, NDArray]:
@@ -215,7 +247,7 @@ def material_cells(picture: Picture) -> list[NDArray[np.float32]]:
     for name, columns in (("albedo", slice(0, 3)), ("roughness", slice(3, 4)), ("metallic", slice(4, 5))):
         values = picture.material[..., columns]
         shown = srgb_encode(values) if name == "albedo" else np.repeat(values, 3, 2)
-        cells.append(labelled(over(picture.alpha, shown, np.array(MAP_BACKDROP, np.float32)), name))
+        cells.append(labelled(picture.shown(shown, np.array(MAP_BACKDROP, np.float32)), name))
     return cells
 
 
@@ -241,12 +273,6 @@ def atlas(maps: NDArray[np.float32], size: int) -> NDArray[np.float32]:
     linear = oiio.ImageBuf(np.ascontiguousarray(maps[..., :3]))
     small = oiio.ImageBufAlgo.resize(linear, filtername="box", roi=oiio.ROI(0, size, 0, size, 0, 1, 0, 3))
     return srgb_encode(np.asarray(small.get_pixels(oiio.FLOAT), np.float32).reshape(size, size, 3))
-
-
-def over(alpha: NDArray[np.bool_], color: NDArray[np.float32], background: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Samples (2H, 2W, 3) where there are any, else a background, at one value a pixel. Returns: (H, W, 3)."""
-    covered = _halve(alpha[..., None].astype(np.float32))
-    return _halve(np.where(alpha[..., None], color, 0)) + (1 - covered) * background
 
 
 def _halve(values: NDArray[np.float32]) -> NDArray[np.float32]:
