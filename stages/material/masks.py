@@ -18,7 +18,7 @@ from stages.material.surface import Array, Surface
 SIDES = ("below", "above", "front", "back", "left", "right", "fade")
 """Kinds that cover a share of the extent, not of the surface."""
 
-DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "spots", "checks", "veins")
+DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "zigzag", "spots", "dots", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
 
 LEAST = {"edges": 0.08, "crevices": 0.08, "hidden": 0.06, "up": 0.25, "down": 0.25}
@@ -46,6 +46,8 @@ def _drawn(mask: Mask, at: Place) -> Place:
 
 def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
     level = 0.0 if mask.level is None else mask.level
+    if mask.kind == "gingham":
+        return _gingham(mask, at)
     value = signal(mask, surface, at)
     if mask.kind in DISTANCES:
         rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.75)
@@ -90,12 +92,16 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
         return surface.occlusion
     if mask.kind in ("stripes", "bands"):
         phase = (z if mask.kind == "bands" else (x + y) * np.float32(0.7071)) / np.float32(mask.size)
-        wave = phase - np.floor(phase)
-        return np.float32(mask.size) * (np.float32(0.5) - abs(wave - np.float32(0.5)))
+        return np.float32(mask.size) * _middle(phase)
     if mask.kind == "checks":
         u, v = at.flat.p[:2] / np.float32(mask.size)
         away = np.minimum(abs(u - np.rint(u)), abs(v - np.rint(v))) * np.float32(mask.size)
         return np.where((np.floor(u) + np.floor(v)) % 2 == 0, away, -away).astype(np.float32)
+    if mask.kind == "dots":
+        return _dots(mask, at)
+    if mask.kind == "zigzag":
+        u, v = at.flat.p[:2] / np.float32(mask.size)
+        return np.float32(0.7071 * mask.size) * _middle(v + abs(u - np.rint(u)))
     if mask.kind == "spots":
         bent = warped(at, 0.05 * mask.size * (0.3 + mask.wear), 0.5 * mask.size, 3)
         return spots(bent, mask.size, (0.22 * mask.size, 0.42 * mask.size), 1.0, 4).inside
@@ -106,6 +112,28 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
         return fbm(at, _chance(mask), 7) + strength
     bent = warped(at, 0.3 * mask.size, mask.size, 3) if mask.kind == "patches" else at
     return fbm(bent, _chance(mask), 7)
+
+
+def _middle(phase: Array) -> Array:
+    """0 at whole numbers … 0.5 half-way between them."""
+    return np.float32(0.5) - abs(phase - np.floor(phase) - np.float32(0.5))
+
+
+def _dots(mask: Mask, at: Place) -> Array:
+    """Minus the distance to the nearest of equal dots in staggered rows, object sizes."""
+    grid = at.flat.p[:2] / np.float32(mask.size)
+    half = np.float32(0.5)
+    near = (np.hypot(*(grid - np.rint(grid))), np.hypot(*(grid - half - np.rint(grid - half))))
+    return -np.float32(mask.size) * np.minimum(*near)
+
+
+def _gingham(mask: Mask, at: Place) -> Array:
+    """Dyed threads one way and the other, each half of all: full where both cross, half where one runs over the undyed."""
+    dyed = [
+        edge(np.float32(mask.size) * (_middle(a / np.float32(mask.size)) - np.float32(0.25)), at.footprint)
+        for a in at.flat.p[:2]
+    ]
+    return (dyed[0] + dyed[1]) * np.float32(0.5)
 
 
 TURN = np.array([[0.8, 0.36, 0.48], [-0.6, 0.48, 0.64], [0.0, -0.8, 0.6]], np.float32)
@@ -141,8 +169,10 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
     world = Place(np.ascontiguousarray(surface.point.T), uv, face, all_seen, seed=recipe.seed)
 
     def settle(mask: Mask, place: Place) -> Mask:
-        if mask.kind == "all" or mask.level is not None:
+        if mask.kind in ("all", "gingham") or mask.level is not None:
             return mask
+        if mask.kind == "dots":  # two in each square
+            return replace(mask, level=-mask.size * float(np.sqrt(mask.share / (2 * np.pi))))
         if mask.kind in SIDES and mask.said and (part := found(mask, surface)):
             return part
         if mask.draw >= 0:

@@ -10,7 +10,8 @@ from typing import Any
 
 KINDS = (
     "all", "below", "above", "front", "back", "left", "right", "fade", "edges", "crevices", "up", "down", "hidden",
-    "spots", "stripes", "bands", "checks", "veins", "patches", "streaks", "scratches", "chips", "pieces", "along",
+    "spots", "dots", "stripes", "bands", "zigzag", "checks", "gingham", "veins",
+    "patches", "streaks", "scratches", "chips", "pieces", "along",
 )  # fmt: skip
 """Ways to say where a layer lies; see `masks.py`."""
 

@@ -78,18 +78,21 @@ PARTS_OF = {
 """Things whose parts lie elsewhere than those of others."""
 
 SHAPES = _table(
-    ("zigzag, zigzags, chevrons, stripes, stripe, striped, vertical stripes, diagonal stripes, "
+    ("polka dots, polka dot, polka, polka-dotted, dots, dotted", Region("dots", 0.25, 0.11)),
+    ("zigzag, zigzags, chevrons, chevron, herringbone pattern", Region("zigzag", 0.5, 0.14)),
+    ("gingham, buffalo check, tattersall", Region("gingham", 0.5, 0.1)),
+    ("stripes, stripe, striped, vertical stripes, diagonal stripes, "
          "racing stripes, racing stripe, hazard stripes, warning stripes",
      Region("stripes", 0.5, 0.14)),
     ("pinstripes, pinstripe, pinstriped, thin stripes, narrow stripes, fine stripes", Region("stripes", 0.12, 0.08)),
     ("bands, band, hoops, rings, ring, straps, strap, belts, belt, banded, horizontal stripes, horizontal bands, banding, sash",
      Region("bands", 0.3, 0.22)),
-    ("spots, spot, dots, polka dots, polka, spotted, dotted, speckles, freckles, flecks, speckled, flecked, polka-dotted",
+    ("spots, spot, spotted, speckles, freckles, flecks, speckled, flecked",
      Region("spots", 0.3, 0.14)),
     ("studs, rivets, eyelets, grommets, sequins, screws, buttons, knobs, bolts, nails, studded, "
      "riveted", Region("spots", 0.06, 0.07)),
     ("chess board, chessboard, checkerboard pattern, checks, checkered, chequered, checkerboard, squares, check, checked, "
-         "check pattern, chessboard pattern, gingham, houndstooth, harlequin, argyle, tattersall, buffalo check, chequerboard, "
+         "check pattern, chessboard pattern, houndstooth, harlequin, argyle, chequerboard, "
          "checker, chequers",
      Region("checks", 0.5, 0.12)),
     ("water stains, patches, patch, stains, stained, splotches, blotches, areas, marbling, swirls, swirl, swirled, swirly, "

@@ -52,7 +52,10 @@ def length(covered: NDArray[np.bool_]) -> float:
     return float(np.pi / 4 * (np.diff(covered, axis=0).sum() + np.diff(covered, axis=1).sum()))
 
 
-@pytest.mark.parametrize("kind", ["below", "front", "stripes", "bands", "spots", "checks", "patches", "edges"])
+SHARP = ("below", "front", "stripes", "bands", "zigzag", "spots", "dots", "checks", "patches", "edges")
+
+
+@pytest.mark.parametrize("kind", SHARP)
 def test_a_border_that_words_want_sharp_is_three_texels_wide_at_most(kind: str) -> None:
     count = 256
     corner = (-0.06, -0.06) if kind == "below" else (-0.5, -0.5)

@@ -87,3 +87,23 @@ def test_a_soft_mask_thins_out() -> None:
     hard, soft = (covered(Mask("patches", 0.4, 0.3, 0.2, soft=soft), 256) for soft in (0.0, 0.4))
     assert abs(hard.mean() - soft.mean()) < 0.08
     assert ((soft > 0.1) & (soft < 0.9)).mean() > 2 * ((hard > 0.1) & (hard < 0.9)).mean()
+
+
+def test_dots_are_equal_and_stand_in_staggered_rows() -> None:
+    whole = covered(Mask("dots", 0.25, 0.125, 0.0), 512)
+    assert abs(whole.mean() - 0.25) < 0.02
+    near = np.roll(whole, (32, 32), (0, 1))  # half of the spacing each way
+    assert abs(whole - near)[64:, 64:].mean() < 0.01 < abs(whole - np.roll(whole, 32, 1)).mean()
+
+
+def test_gingham_has_three_tones() -> None:
+    whole = covered(Mask("gingham", 0.5, 0.125, 0.0), 512)
+    shares = [(abs(whole - tone) < 0.02).mean() for tone in (0.0, 0.5, 1.0)]
+    assert np.allclose(shares, (0.25, 0.5, 0.25), atol=0.03)
+
+
+def test_chevrons_turn_back_on_themselves() -> None:
+    whole = covered(Mask("zigzag", 0.5, 0.125, 0.0), 512)
+    assert abs(whole.mean() - 0.5) < 0.02
+    assert abs(whole - whole[:, ::-1]).mean() < 0.02  # a mirror image of itself
+    assert abs(whole - np.roll(whole, 32, 1)).mean() > 0.2  # and not of straight bands

@@ -33,7 +33,7 @@ cast iron pan with a wooden handle | all metal #4e4d4c | below wood #92633b
 gray granite with copper inlay | all stone #8a8684 | veins/bands metal #fad1c2
 black and white checkered marble floor | all stone #1a1a1a | checks stone #eeeeee
 red and white striped canvas tent | all fabric #c01818 | stripes fabric #eeeeee
-blue ceramic vase with white polka dots | all ceramic #1f45b8 | spots ceramic #eeeeee
+blue ceramic vase with white polka dots | all ceramic #1f45b8 | dots ceramic #eeeeee
 old leather suitcase with brass corners | all leather #5e3a22 | edges metal #f4e2ae
 stone statue covered in ivy | all stone #8c8880 | patches/crevices organic #3c5a20
 bronze bust with verdigris in the crevices | all metal #d9a877 | crevices rust #5fa08c
