@@ -115,7 +115,7 @@ def test_how_much_of_it_is_heard(read) -> None:  # type: ignore[no-untyped-def]
 
 def test_what_lies_on_a_part_lies_nowhere_else(read) -> None:  # type: ignore[no-untyped-def]
     dots = read("a mushroom, beige skin, with a red cap with white dots").layers[-1]
-    assert [mask.kind for mask in dots.masks] == ["above", "spots"]
+    assert [mask.kind for mask in dots.masks] == ["above", "dots"]
 
 
 @pytest.mark.parametrize(
