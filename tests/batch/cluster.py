@@ -10,7 +10,6 @@ removes it again.
 import argparse
 import contextlib
 import os
-import random
 import shutil
 import signal
 import socket
@@ -27,7 +26,12 @@ from stages.batch.summary import outputs, run_logs, summarise
 from stages.core.artifact import intact, read_json, read_manifest
 from stages.core.schemas import ASSET, CONDITIONS
 from tests.batch import campaign
-from tests.batch.campaign import ROOT, artefacts, by_hand, environment, times, write_jobs
+from tests.batch.campaign import ROOT, TINY, artefacts, by_hand, environment, times, write_jobs
+from tests.pipeline import cube_sphere
+
+VIEWS = 24
+LONG = {"conditions": f"--views {VIEWS} --size 64 --env overcast --quality draft", "distill": "--steps 2000"}
+"""Of the job in whose midst nodes die: the distillation takes longer than a minute, after which there is a checkpoint."""
 
 CONF = Path("/etc/slurm/slurm.conf")
 NODES = ("n1", "n2")
@@ -141,15 +145,16 @@ def through_deaths(jobs: Path, folder: Path) -> str:
     out, log = jobs.with_suffix(""), jobs.with_name("log.txt")
     with open(log, "w") as stream:
         process = subprocess.Popen(engine(jobs), env=environment(), stdout=stream, stderr=stream)
-        for command, begun in (("conditions", out / "shapes/*/*.part/view_000"), ("distill", out / "*/material.*")):
-            pattern = begun.relative_to(out)
+        for command, begun in {
+            "conditions": "shapes/long-*/*.part/view_005",
+            "distill": "long/material.npz.checkpoint",
+        }.items():
             while process.poll() is None:
-                node = node_of(f"dreammat_cli {command} ")
-                if node and any(out.glob(str(pattern))):
+                node = node_of(f"dreammat_cli {command} {out}/shapes/long-")
+                if node and any(out.glob(begun)):
                     break
                 time.sleep(0.5)
             assert process.poll() is None, f"the workflow ended before {command} was seen:\n{log.read_text()[-2000:]}"
-            time.sleep(random.Random(command).random())
             print(f"node {node} killed during {command}, with Slurm's jobs {', '.join(kill(node, folder))} on it", flush=True)
             time.sleep(30)  # longer than Slurm waits for a node
             run("slurmd", "-N", node)
@@ -168,9 +173,12 @@ def check(jobs: Path, every: list[Job], folder: Path) -> None:
         for path, schema in ((there["conditions"].parent, CONDITIONS), (there["bake"].parent, ASSET)):
             _, listed = read_manifest(path, schema)
             files += sum(bool(intact(path, name, listed)) for name in listed)
-    resumed = [read_json(run_logs(job, out)["distill"])["resumed"] for job in every]
-    print(f"{told}\n{files} files as their manifests say; distillations resumed at steps {sorted(resumed)[-2:]}", flush=True)
-    sample = every[:2]
+    runs = run_logs(every[-1], out)
+    views, step = read_json(runs["conditions"])["views_made"], read_json(runs["distill"])["resumed"]
+    print(f"{told}\n{files} files as their manifests say", flush=True)
+    print(f"after the deaths {views} of {VIEWS} views were left to make, and step {step} was the first", flush=True)
+    assert views <= VIEWS - 5 and step > 0
+    sample = every[-2:]
     by_hand(sample, folder / "by_hand")
     found, expected = artefacts(out), artefacts(folder / "by_hand")
     differing = [name for name, digest in expected.items() if found.get(name) != digest]
@@ -186,7 +194,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as scratch, slurm(Path(scratch) / "slurm") as folder:
         work = (chosen.folder or Path(scratch) / "work").resolve()
         work.mkdir(parents=True, exist_ok=True)
-        jobs = write_jobs(work, chosen.jobs, broken=False)
+        jobs = write_jobs(work, chosen.jobs - 1, broken=False)
+        cube_sphere(work / "long.obj", 3)
+        row = ["long", "long.obj", "oak", "0", TINY["prep"], LONG["conditions"], LONG["distill"], TINY["bake"]]
+        jobs.write_text(jobs.read_text() + ",".join(row) + "\n")
         every, _ = read(jobs)
         log = through_deaths(jobs, folder)
         before = times(jobs)
