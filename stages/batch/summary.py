@@ -140,6 +140,8 @@ def thumbnail(job: str, out: Path) -> str:
             pixels = read_image(preview)[..., :3]
         except DreammatError:  # half a picture of a job at work
             return ""
+        side = pixels.shape[1] // 4  # its first row is the asset from four sides, of which two are enough here
+        pixels = pixels[:side, : 2 * side]
         step = max(1, pixels.shape[1] // THUMBNAIL)
         height, width = (size // step * step for size in pixels.shape[:2])
         blocks = pixels[:height, :width].reshape(height // step, step, width // step, step, 3)

@@ -28,7 +28,7 @@ def jobs(tmp_path: Path) -> list[Job]:
     for path in there:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(b"x")
-    write_png(out / "done/asset/preview.png", np.full((40, 1000, 3), 0.25, np.float32))
+    write_png(out / "done/asset/preview.png", np.full((960, 1280, 3), 0.25, np.float32))
     (out / "done/asset/report.html").write_text("report")
     for stage, path in run_logs(done, out).items():
         path.write_text(json.dumps({"seconds": 10, "cpu_seconds": 5 if stage == "bake" else 2, "peak_memory_gib": 0.5}))
@@ -54,7 +54,7 @@ def test_every_job_has_a_row_a_picture_and_its_error(jobs: list[Job], tmp_path: 
     assert page.index("<b>bad</b>") < page.index(">done</a>") and "done &lt;clay&gt;" in page
     assert 'src="thumbnails/done.png"' in page and 'href="done/asset/report.html"' in page and page.count("<img") == 1
     small = read_image(tmp_path / "out/thumbnails/done.png")
-    assert small.shape == (13, 333, 3) and small.mean() == pytest.approx(0.25, abs=0.01)
+    assert small.shape == (160, 320, 3) and small.mean() == pytest.approx(0.25, abs=0.01)
 
 
 def test_conditions_that_were_removed_are_not_missed(jobs: list[Job], tmp_path: Path) -> None:
