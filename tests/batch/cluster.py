@@ -87,8 +87,16 @@ def slurm(folder: Path) -> Iterator[Path]:
     finally:
         for name in (*NODES, "slurmctld", "munge"):
             with contextlib.suppress(OSError, ValueError):
-                os.kill(int((folder / f"{name}.pid").read_text()), signal.SIGTERM)
+                end(int((folder / f"{name}.pid").read_text()))
         CONF.unlink()
+
+
+def end(daemon: int) -> None:
+    """Ask a daemon to end, and wait until it has."""
+    os.kill(daemon, signal.SIGTERM)
+    for _ in range(60):
+        os.kill(daemon, 0)  # raises once it is gone
+        time.sleep(0.5)
 
 
 def run(*words: str) -> str:
