@@ -42,7 +42,7 @@ OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" 
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test test-workflow test-cluster campaign hostile uvs parts lint asset batch scene export docs bench beside clean
+.PHONY: help setup demo test test-workflow test-cluster campaign pages poor hostile uvs parts lint asset batch scene export docs bench beside clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -139,6 +139,12 @@ test-cluster: $(ENGINE)  ## twenty tiny jobs on Slurm with two virtual nodes her
 
 campaign: $(VENV)/.ready  ## 1,100 damaged artefacts, and 100 kills at random moments
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.campaign --reads 1000 --damages 100 --kills 100
+
+pages: $(VENV)/.ready  ## every command of every page, as it is written there (some minutes)
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.pages
+
+poor: $(VENV)/.ready  ## doctor and run without GPU, without extras, in 2 GiB, with nothing that can be written but the output
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.poor
 
 hostile: $(VENV)/.ready  ## large meshes that nobody means well with, through prep within their time (half an hour)
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.prep.hostile

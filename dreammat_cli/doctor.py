@@ -2,7 +2,6 @@
 
 import os
 import platform
-import resource
 import shutil
 import sys
 import tempfile
@@ -110,7 +109,7 @@ def machine() -> Iterator[Finding]:
 
 def free_memory() -> float:
     """GiB that this process may still take: of the machine, its control group, and its own limit."""
-    limits = [float("inf")]
+    limits = [float("inf"), float("inf")]
     try:
         lines = dict(line.split(":", 1) for line in Path("/proc/meminfo").read_text().splitlines())
         limits.append(int(lines["MemAvailable"].split()[0]) / 2**20)
@@ -118,8 +117,12 @@ def free_memory() -> float:
         limits.append((int(held) - int(Path("/sys/fs/cgroup/memory.current").read_text())) / 2**30)
     except (OSError, ValueError, KeyError):  # not Linux, or no limit
         pass
-    own = resource.getrlimit(resource.RLIMIT_AS)[0]
-    return min(*limits, float("inf") if own == resource.RLIM_INFINITY else own / 2**30)
+    try:
+        import resource
+    except ImportError:  # Windows
+        return min(limits)
+    own = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
+    return min(*limits, *(limit / 2**30 for limit in own if limit != resource.RLIM_INFINITY))
 
 
 def accelerator() -> Iterator[Finding]:

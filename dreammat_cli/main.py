@@ -9,7 +9,7 @@ from importlib.metadata import version
 import click
 
 from dreammat_cli.common import Guessing
-from stages.core.errors import DreammatError
+from stages.core.errors import DreammatError, OutputError, one_line
 
 COMMANDS = {
     "run": "Texture a mesh: prep, conditions, distill and bake in one call.",
@@ -32,6 +32,8 @@ COMMANDS = {
 }
 
 INTERRUPTED = 130
+
+OUT_OF_MEMORY = "out of memory; try fewer or smaller --views of conditions, a smaller --size of bake, or a simpler mesh"
 
 
 class LazyGroup(Guessing):
@@ -94,7 +96,16 @@ def main() -> None:
     except (KeyboardInterrupt, click.Abort):
         fail("interrupted; the same command continues where it stopped", INTERRUPTED)
     except MemoryError:
-        fail("out of memory; try fewer or smaller views, a smaller texture, or a simpler mesh", 5)
+        fail(OUT_OF_MEMORY, OutputError.exit_code)
+    except RuntimeError as error:
+        if not any(words in str(error) for words in ("allocate memory", "out of memory", "bad_alloc", "start new thread")):
+            raise
+        fail(OUT_OF_MEMORY, OutputError.exit_code)
+    except ImportError as error:
+        package = (error.name or "a package").split(".")[0]
+        if package in ("dreammat_cli", "stages"):
+            raise
+        fail(f"{package} cannot be loaded: {one_line(error)}; dreammat doctor says how to mend it", OutputError.exit_code)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)

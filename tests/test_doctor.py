@@ -2,7 +2,6 @@
 
 import json
 import os
-import resource
 import subprocess
 import sys
 from collections.abc import Callable
@@ -10,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
+from dreammat_cli import main
 from dreammat_cli.doctor import EXTRAS
-
-GIB = 1 << 30
+from tests.poor import read_only, two_gib
 
 
 def doctor(cwd: Path, name: str = "", source: str = "", before: Callable[[], None] | None = None) -> tuple[int, dict, str]:
@@ -45,9 +44,39 @@ def test_a_broken_package_is_named_with_its_remedy(tmp_path: Path) -> None:
     assert error.count("\n") == 1 and "xatlas" in error
 
 
-@pytest.mark.skipif(not hasattr(resource, "RLIMIT_AS"), reason="needs a limit of memory")
 def test_little_memory_is_told(tmp_path: Path) -> None:
-    code, found, _ = doctor(tmp_path, before=lambda: resource.setrlimit(resource.RLIMIT_AS, (2 * GIB, 2 * GIB)))
-    assert code in (0, 5)  # torch may not even load in it
-    if found:
-        assert float(found["memory"]["found"].split()[0]) <= 2 and "smaller --size" in found["memory"]["remedy"]
+    code, found, error = doctor(tmp_path, before=two_gib)
+    assert code == 0, error
+    assert float(found["memory"]["found"].split()[0]) <= 2 and "smaller --size" in found["memory"]["remedy"]
+
+
+def test_code_that_cannot_be_written_beside_is_compiled_all_the_same(tmp_path: Path) -> None:
+    """`make poor` runs all stages so; here every module is only imported, which is where numba looks for a folder."""
+    there = os.environ | read_only(tmp_path)
+    names = "[m.name for m in pkgutil.walk_packages(stages.__path__, 'stages.') if not m.name.endswith('_worker')]"
+    code = f"import importlib, pkgutil, stages\nfor name in {names}: importlib.import_module(name)\nprint(stages.__path__[0])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=there, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip() == str(tmp_path / "stages")
+
+
+@pytest.mark.parametrize(
+    ("raised", "words"),
+    [
+        ("MemoryError()", ["out of memory", "--views"]),
+        ("RuntimeError(\"DefaultCPUAllocator: can't allocate memory: you tried to allocate 8 bytes\")", ["out of memory"]),
+        ("ImportError('libtorch_cpu.so: failed to map segment', name='torch')", ["torch cannot be loaded", "doctor"]),
+    ],
+)
+def test_what_a_poor_machine_cannot_do_is_one_line(
+    raised: str, words: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def call(**_: object) -> None:
+        raise eval(raised)
+
+    monkeypatch.setattr(main, "cli", call)
+    with pytest.raises(SystemExit) as ended:
+        main.main()
+    error = capsys.readouterr().err
+    assert ended.value.code == 5 and error.count("\n") == 1
+    assert all(word in error for word in words)

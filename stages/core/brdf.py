@@ -11,14 +11,15 @@ Masking-Shadowing Function", Eq. 99; Heitz 2018, "Sampling the GGX Distribution 
 import math
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
+
+from stages.core.parallel import compiled
 
 MIN_ALPHA = 1e-4
 """Floor of alpha where a density is evaluated; roughness below 0.01 is treated as a mirror by the samplers."""
 
-compiled = numba.njit(inline="always", error_model="numpy", cache=True)
+inlined = compiled(inline="always")
 
 
 def alpha_from_roughness(roughness: Any) -> Any:
@@ -26,7 +27,7 @@ def alpha_from_roughness(roughness: Any) -> Any:
     return roughness * roughness
 
 
-@compiled
+@inlined
 def schlick_weight(cosine):  # type: ignore[no-untyped-def]
     """s = (1 - V·H)^5."""
     x = 1 - cosine
@@ -34,7 +35,7 @@ def schlick_weight(cosine):  # type: ignore[no-untyped-def]
     return x2 * x2 * x
 
 
-@compiled
+@inlined
 def ggx_d(x, y, z, alpha):  # type: ignore[no-untyped-def]
     """GGX density of microfacet normals (x, y, z), 1/sr; the form has no cancellation at small alpha."""
     a2 = alpha * alpha
@@ -42,7 +43,7 @@ def ggx_d(x, y, z, alpha):  # type: ignore[no-untyped-def]
     return a2 / (math.pi * q * q)
 
 
-@compiled
+@inlined
 def smith_lambda(z, alpha):  # type: ignore[no-untyped-def]
     """Smith's Lambda of a direction whose cosine with the normal is z > 0."""
     z2 = z * z
@@ -51,7 +52,7 @@ def smith_lambda(z, alpha):  # type: ignore[no-untyped-def]
     return half * (math.sqrt(1 + a2 * (1 - z2) / z2) - 1)
 
 
-@compiled
+@inlined
 def specular_over_f(wo_z, wi_z, m_x, m_y, m_z, alpha):  # type: ignore[no-untyped-def]
     """D G / (4 N·V) = BRDF times N·L without Fresnel, height-correlated G; wo_z, wi_z > 0."""
     D = ggx_d(m_x, m_y, m_z, alpha)
@@ -59,13 +60,13 @@ def specular_over_f(wo_z, wi_z, m_x, m_y, m_z, alpha):  # type: ignore[no-untype
     return D * G / (4 * wo_z)
 
 
-@compiled
+@inlined
 def pdf_vndf(wo_z, m_x, m_y, m_z, alpha):  # type: ignore[no-untyped-def]
     """Density, in 1/sr of wi, of reflecting wo at a visible microfacet normal: D G1(wo) / (4 N·V)."""
     return ggx_d(m_x, m_y, m_z, alpha) / (1 + smith_lambda(wo_z, alpha)) / (4 * wo_z)
 
 
-@compiled
+@inlined
 def sample_vndf(wo_x, wo_y, wo_z, alpha, u0, u1):  # type: ignore[no-untyped-def]
     """A visible microfacet normal. Source: Dupuy & Benyoub 2023, "Sampling Visible GGX Normals with Spherical Caps".
 
@@ -86,7 +87,7 @@ def sample_vndf(wo_x, wo_y, wo_z, alpha, u0, u1):  # type: ignore[no-untyped-def
     return m_x * s, m_y * s, h_z * s
 
 
-@compiled
+@inlined
 def invert_vndf(wo_x, wo_y, wo_z, alpha, m_x, m_y, m_z):  # type: ignore[no-untyped-def]
     """The (u0, u1) that `sample_vndf` turns into this microfacet normal."""
     x, y, z = wo_x * alpha, wo_y * alpha, wo_z
@@ -100,7 +101,7 @@ def invert_vndf(wo_x, wo_y, wo_z, alpha, m_x, m_y, m_z):  # type: ignore[no-unty
     return (u0 if u0 >= 0 else u0 + 1), 1 - (c_z + z) / (1 + z)
 
 
-@compiled
+@inlined
 def sample_cosine(u0, u1):  # type: ignore[no-untyped-def]
     """A direction with density cos/pi over the upper hemisphere."""
     r = math.sqrt(u0)
@@ -108,20 +109,20 @@ def sample_cosine(u0, u1):  # type: ignore[no-untyped-def]
     return r * math.cos(phi), r * math.sin(phi), math.sqrt(max(1.0 - u0, 0.0))
 
 
-@compiled
+@inlined
 def pdf_cosine(wi_z):  # type: ignore[no-untyped-def]
     """cos/pi, 1/sr."""
     return wi_z / math.pi
 
 
-@compiled
+@inlined
 def invert_cosine(x, y, z):  # type: ignore[no-untyped-def]
     """The (u0, u1) that `sample_cosine` turns into this direction."""
     u1 = math.atan2(y, x) / (2 * math.pi)
     return x * x + y * y, (u1 if u1 >= 0 else u1 + 1)
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def directional_albedo(cosines, alpha, resolution):  # type: ignore[no-untyped-def]
     """Energy that an unoccluded, uniformly lit point of each term reflects, by float64 midpoint quadrature.
 

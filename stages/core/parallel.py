@@ -18,14 +18,19 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
-def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Compile with numba, without Python's lock; the machine code is cached where numba finds a folder to write."""
+def compiled(function: Callable[..., Any] | None = None, **options: Any) -> Callable[..., Any]:
+    """Compile with numba; the machine code is cached where numba finds a folder to write.
+
+    Args: options: of numba.njit, beside those that all kernels have; `@compiled` and `@compiled(inline="always")` both work.
+    """
     import numba  # takes half a second, which who only wants threads need not spend
 
+    if function is None:
+        return functools.partial(compiled, **options)
     try:
-        return numba.njit(nogil=True, cache=True, error_model="numpy")(function)
-    except RuntimeError:  # no folder for the cache: compile in every process
-        return numba.njit(nogil=True, error_model="numpy")(function)
+        return numba.njit(nogil=True, cache=True, error_model="numpy", **options)(function)
+    except RuntimeError:  # neither beside the code nor at home: compile in every process
+        return numba.njit(nogil=True, error_model="numpy", **options)(function)
 
 
 @functools.cache

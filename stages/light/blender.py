@@ -17,7 +17,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.brdf import compiled, sample_cosine, sample_vndf, smith_lambda
+from stages.core.brdf import inlined, sample_cosine, sample_vndf, smith_lambda
+from stages.core.parallel import compiled
 
 F0 = 0.08
 """Normal reflectance of the dielectric."""
@@ -26,7 +27,7 @@ IOR = (1 + math.sqrt(F0)) / (1 - math.sqrt(F0))
 """The index of refraction that has it."""
 
 
-@compiled
+@inlined
 def fresnel(cosine):  # type: ignore[no-untyped-def]
     """Reflectance of the dielectric at V·H = cosine, rescaled from F0 ... 1 to 0 ... 1; what Schlick's s is to glTF."""
     g = math.sqrt(IOR * IOR - 1 + cosine * cosine)
@@ -34,7 +35,7 @@ def fresnel(cosine):  # type: ignore[no-untyped-def]
     return max(a * a * (1 + b * b) * 0.5 - F0, 0.0) / (1 - F0)
 
 
-@compiled
+@inlined
 def burley(wo_z, wi_z, cosine, roughness, departure):  # type: ignore[no-untyped-def]
     """Diffuse BRDF times N·L. Args: N·V, N·L, V·H; departure: 1, or 0 for Lambert's lobe."""
     x, y = 1 - min(wo_z, 1.0), 1 - min(wi_z, 1.0)
@@ -42,7 +43,7 @@ def burley(wo_z, wi_z, cosine, roughness, departure):  # type: ignore[no-untyped
     return (1 + bend * x * x * x * x * x) * (1 + bend * y * y * y * y * y) * wi_z / math.pi
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def open_albedo(cosines, roughness, departure, reflection, resolution):  # type: ignore[no-untyped-def]
     """What an open point reflects of an even light, by float64 midpoint quadrature as in `core.brdf.directional_albedo`.
 
@@ -79,7 +80,7 @@ def open_albedo(cosines, roughness, departure, reflection, resolution):  # type:
     return albedo / (resolution * resolution)
 
 
-@numba.vectorize(cache=True)
+@numba.vectorize
 def mirror_reflectance(cosine):  # type: ignore[no-untyped-def]
     """Reflectance of the dielectric at N·V = cosine, an array of any shape."""
     return F0 + (1 - F0) * fresnel(cosine)

@@ -8,12 +8,12 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.artifact import reason, write_exr
 from stages.core.errors import InputError
+from stages.core.parallel import compiled
 from stages.light.radiance_file import read_radiance
 
 MAX_REPAIRED = 0.01
@@ -84,8 +84,8 @@ def _read(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float64] | None]:
         if path.suffix.lower() in (".hdr", ".pic"):
             return read_radiance(path)
     except OSError as error:
-        raise InputError(f"{path}: {reason(error)}") from error
-    raise InputError(f"{path}: a '{path.suffix}' file, expected .hdr or .exr")
+        raise InputError(f"{path}: {reason(error)}; give a .hdr or .exr file that can be read") from error
+    raise InputError(f"{path}: a '{path.suffix}' file, expected .hdr or .exr; save it as one of them")
 
 
 def directions_of_texels(height: int, width: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -102,7 +102,7 @@ def directions_of_texels(height: int, width: int) -> tuple[NDArray[np.float64], 
     return directions, (edges[:-1] - edges[1:]) * 2 * np.pi / width
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def lookup(radiance, directions):  # type: ignore[no-untyped-def]
     """Bilinear radiance along unit directions. Args: (H, W, 3), (N, 3) world. Returns: (N, 3) float64."""
     result = np.empty((len(directions), 3))
@@ -111,7 +111,7 @@ def lookup(radiance, directions):  # type: ignore[no-untyped-def]
     return result
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def bilinear(radiance, direction, found):  # type: ignore[no-untyped-def]
     """Write the bilinear radiance along one unit direction, (3,), into `found`, (3,)."""
     height, width, _ = radiance.shape
@@ -120,7 +120,7 @@ def bilinear(radiance, direction, found):  # type: ignore[no-untyped-def]
     bilinear_at(radiance, u, v, found)
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def bilinear_at(radiance, u, v, found):  # type: ignore[no-untyped-def]
     """Write the bilinear radiance at column u and row v, whose texels' centres are at +0.5, into `found`, (3,)."""
     height, width, _ = radiance.shape

@@ -11,12 +11,12 @@ left of a picture when what is known is taken out).
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
 from stages.core.albedo import MIN_COSINE
+from stages.core.parallel import compiled
 from stages.light.gbuffer import GBuffer
 from stages.light.lamps import Lamps
 from stages.light.light_set import CHANNELS
@@ -173,7 +173,7 @@ def _take_out(mean, shown, places, pixel, moments, start, end, kept):  # type: i
                 mean[p, places[j], c] -= seen[c] * shown[p, j, c]
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)  # in this very order: no highlight is added to what it hides
+@compiled  # in this very order: no highlight is added to what it hides
 def _put_back(smooth, mean, kept, places, start, end):  # type: ignore[no-untyped-def]
     for p in range(start, end):
         for j in range(len(places)):

@@ -2,13 +2,13 @@
 
 import math
 
-import numba
 import numpy as np
 
+from stages.core.parallel import compiled
 from stages.light.environment import bilinear_at
 
 
-@numba.njit(inline="always", error_model="numpy", cache=True)
+@compiled(inline="always")
 def direction_to_square(x, y, z):  # type: ignore[no-untyped-def]
     """Unit direction to [0, 1]^2, area-preserving. Source: Clarberg 2008, "Fast Equal-Area Mapping", Eq. 8-10."""
     radius = math.sqrt(max(1 - abs(z), 0.0))
@@ -23,7 +23,7 @@ def direction_to_square(x, y, z):  # type: ignore[no-untyped-def]
     return (u + 1) * 0.5, (v + 1) * 0.5
 
 
-@numba.njit(inline="always", error_model="numpy", cache=True)
+@compiled(inline="always")
 def square_to_direction(u, v):  # type: ignore[no-untyped-def]
     """[0, 1]^2 to a unit direction, the inverse of `direction_to_square`."""
     u, v = 2 * u - 1, 2 * v - 1
@@ -38,7 +38,7 @@ def square_to_direction(u, v):  # type: ignore[no-untyped-def]
     return (x if u >= 0 else -x), (y if v >= 0 else -y), z
 
 
-@numba.njit(inline="always", error_model="numpy", cache=True)
+@compiled(inline="always")
 def square_to_texel(u, v, height, width):  # type: ignore[no-untyped-def]
     """[0, 1]^2 to the column and row of a latitude-longitude light, and z: where `lookup` reads the light along
     `square_to_direction`, without sines to be undone again."""
@@ -53,7 +53,7 @@ def square_to_texel(u, v, height, width):  # type: ignore[no-untyped-def]
     return (0.5 - (turn if v >= 0 else -turn)) * width, math.acos(min(max(z, -1.0), 1.0)) / math.pi * height, z
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def texel_directions(size):  # type: ignore[no-untyped-def]
     """Direction of each texel centre of a size x size square: x, y, z, (size, size) each."""
     result = np.empty((3, size, size))
@@ -64,7 +64,7 @@ def texel_directions(size):  # type: ignore[no-untyped-def]
     return result
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def octahedral(radiance, size, oversample):  # type: ignore[no-untyped-def]
     """The light on the octahedral square, each texel the mean of oversample^2 look-ups; black parts are passed over.
 

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.color import REC709, rgb_to_xyz, to_rec709
 from stages.core.errors import InputError
+from stages.core.parallel import compiled
 
 FORMATS = ("32-bit_rle_rgbe", "32-bit_rle_xyze")
 PIXELS_A_BYTE = 1024
@@ -62,7 +62,7 @@ def read_radiance(path: Path) -> tuple[NDArray[np.float32], NDArray[np.float64] 
 def _header(path: Path, data: bytes) -> Header:
     """Raises: InputError."""
     if not data.startswith(b"#?"):
-        raise InputError(f"{path}: not a Radiance picture; its first line does not begin with #?")
+        raise InputError(f"{path}: not a Radiance picture; its first line does not begin with #?; save it as .hdr again")
     lines: dict[str, list[str]] = {}
     position = 0
     for line, position in _lines(data):
@@ -135,7 +135,7 @@ def _turned(pixels: NDArray[np.float32], axes: tuple[str, str]) -> NDArray[np.fl
     return np.ascontiguousarray(pixels[:, ::-1] if axes[1] == "-X" else pixels)
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def _decode(data, position, texels):  # type: ignore[no-untyped-def]
     """Fill `texels`, (slow, fast, 4) uint8, from the bytes at `position`. Returns: whole lines found."""
     slow, fast, _ = texels.shape
@@ -154,7 +154,7 @@ def _decode(data, position, texels):  # type: ignore[no-untyped-def]
     return slow
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def _separate(data, position, row):  # type: ignore[no-untyped-def]
     """One line of the newer encoding: the four components one after the other. Returns: the next position, or -1."""
     for component in range(4):
@@ -173,7 +173,7 @@ def _separate(data, position, row):  # type: ignore[no-untyped-def]
     return position
 
 
-@numba.njit(error_model="numpy", cache=True, nogil=True)
+@compiled
 def _whole(data, position, row):  # type: ignore[no-untyped-def]
     """One line of whole pixels, where 1 1 1 n repeats the one before n times. Returns: the next position, or -1."""
     at, shift = 0, 0

@@ -13,11 +13,10 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.parallel import cores
+from stages.core.parallel import compiled, cores
 from stages.light.gbuffer import GBuffer
 
 RADIUS = 2
@@ -42,9 +41,9 @@ BLOCK = 4
 
 POINTS_PER_TASK = 4096
 
-inline = numba.njit(inline="always", error_model="numpy", cache=True)
+inline = compiled(inline="always")
 
-fast = numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
+fast = compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
 
 
 @dataclass(frozen=True)

@@ -127,11 +127,11 @@ def _meshes(path: Path) -> list[trimesh.Trimesh]:
         _expect_companions(path)
         parts = trimesh.load_scene(path).dump()
     except OSError as error:
-        raise InputError(f"{path}: {reason(error)}") from error
+        raise InputError(f"{path}: {reason(error)}; expected a textured .glb or .gltf model") from error
     except InputError:
         raise
     except Exception as error:  # the loader raises whatever a malformed file makes it trip over
-        raise InputError(f"{path}: not a readable glTF model ({one_line(error)})") from error
+        raise InputError(f"{path}: not a readable glTF model ({one_line(error)}); export it again") from error
     if transformed:
         raise InputError(f"{path}: uses {_EXTENSION.decode()}, which is not supported; export it without")
     meshes = [mesh for mesh in parts if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces)]

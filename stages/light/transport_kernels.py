@@ -2,11 +2,11 @@
 
 import math
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.albedo import MIN_COSINE
+from stages.core.parallel import compiled
 from stages.light.blender import F0, burley, fresnel
 from stages.light.environment import bilinear
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
@@ -29,8 +29,8 @@ move. Blender's default (Shadow Terminator: Geometry Offset)."""
 LANES = 16
 """Rays are weighed in multiples of this many, so that a vector unit has no odd ones left over."""
 
-fast = numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-inline = numba.njit(inline="always", error_model="numpy", cache=True)
+fast = compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
+inline = compiled(inline="always")
 
 
 def interleaved_shifts() -> NDArray[np.float64]:

@@ -6,12 +6,13 @@ which a vector unit computes for many points at once. """
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-fast = numba.njit(error_model="numpy", cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz", "arcp"})
-inline = numba.njit(inline="always", error_model="numpy", cache=True)
+from stages.core.parallel import compiled
+
+fast = compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
+inline = compiled(inline="always")
 
 UNIT = np.float32(2.0**-23)
 GRADIENT_SCALE = np.float32(5.23)
