@@ -148,6 +148,15 @@ class Count(MofNCompleteColumn):
         return Text("") if task.fields.get("seconds") else super().render(task)
 
 
+class Left(TimeRemainingColumn):
+    """Time left: by the pace of the units, or what a run of stages makes of it."""
+
+    def render(self, task: Task) -> Text:
+        if task.fields.get("seconds"):
+            return Text(told(task.remaining or 0.0), style="progress.remaining")
+        return super().render(task)
+
+
 class reporter:
     """Context manager that gives a stage its `Progress`: a bar on a terminal, lines elsewhere, nothing when quiet."""
 
@@ -173,7 +182,7 @@ class reporter:
         """What shows progress where stderr goes to."""
         if not sys.stderr.isatty():
             return self.line
-        columns = (TextColumn("{task.description}"), BarColumn(), Count(), Rate(), TimeRemainingColumn())
+        columns = (TextColumn("{task.description}"), BarColumn(), Count(), Rate(), Left())
         self.bar = Bar(*columns, console=Console(stderr=True), transient=True)
         self.bar.start()
         if self.whole:

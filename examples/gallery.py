@@ -38,7 +38,7 @@ PIECES = (
     Piece("skull.obj", "odedstein/meshes", "CC BY 3.0", "white marble with veins of gold", (0, 1)),
 )  # fmt: skip
 
-DRAWN, PIXELS = 800, 480
+DRAWN, PIXELS = 480, 420
 """Side of a view as it is drawn, and as it is shown."""
 
 MARGIN = 0.06
@@ -62,7 +62,7 @@ def view_of(piece: Piece, meshes: Path, folder: Path) -> NDArray[np.uint8]:
         sys.exit(f"{meshes}: has no {piece.file}; get it from https://github.com/{piece.source}")
     job = folder / mesh.stem
     parts = " ".join(f"--part '{name}' '{words}'" for name, words in piece.parts)
-    options = {"conditions": "--views 24", "distill": parts, "bake": f"--preview-size {DRAWN}"}
+    options = {"conditions": "--views 16 --size 128", "distill": parts, "bake": f"--size 1024 --preview-size {DRAWN}"}
     with_options = [word for stage, text in options.items() for word in ("--with", stage, text)]
     command = [sys.executable, "-m", "dreammat_cli", "run", str(mesh), "--prompt", piece.prompt, "-o", str(job), *with_options]
     subprocess.run(command, check=True)

@@ -88,12 +88,14 @@ def run(page: Path, world: Path, folder: Path) -> subprocess.CompletedProcess[st
 
 
 def make_world(folder: Path) -> Path:
-    """All that pages name. Returns: the folder."""
+    """The files that pages name, as people bring them. Returns: the folder."""
+    folder.mkdir()
     for name in TREE:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy2
         copy(ROOT / name, folder / name)
     install(folder)
     write_chair(folder / "chair.obj")
+    shutil.copy(folder / "chair.obj", folder / "André's chair #2 (50%).obj")
     write_room(folder / "room.glb")
     table = re.search(r"```toml\n(.*?)```", (ROOT / "docs/parts.md").read_text(), re.S)
     assert table
@@ -108,6 +110,11 @@ def make_world(folder: Path) -> Path:
         (folder / "jobs" / number).mkdir(parents=True)
         shutil.copy(folder / "chair.obj", folder / "jobs" / number)
         (folder / "jobs" / number / "prompt.txt").write_text("oak\n")
+    return folder
+
+
+def add_artefacts(folder: Path) -> None:
+    """What pages have from earlier ones: the chair, textured, under the names that they give it."""
     dreammat = folder / ".venv/bin/dreammat"
     subprocess.run([dreammat, "run", "chair.obj", "--prompt", "oak", "-o", "chair", "-q"], cwd=folder, check=True)
     shutil.copytree(folder / "chair", folder / "assets/chair")
@@ -116,7 +123,6 @@ def make_world(folder: Path) -> Path:
     (folder / "models").mkdir()
     shutil.copy(folder / "chair/asset/model.glb", folder / "models/chair.glb")
     (folder / "captions.json").write_text('{"chair.glb": "an oak chair"}')
-    return folder
 
 
 def install(folder: Path) -> None:
@@ -140,7 +146,7 @@ def install(folder: Path) -> None:
 def commit(folder: Path) -> None:
     """Make the folder a repository that can be cloned."""
     git = ["git", "-C", str(folder), "-c", "user.name=x", "-c", "user.email=x@example.org", "-c", "init.defaultBranch=main"]
-    for words in (["init", "-q"], ["add", "-f", *TREE, "chair.obj", ".venv"], ["commit", "-q", "-m", "A tree"]):
+    for words in (["init", "-q"], ["add", "-f", *TREE, ".venv", ":(glob)*.obj"], ["commit", "-q", "-m", "A tree"]):
         subprocess.run([*git, *words], check=True)
 
 
@@ -205,9 +211,8 @@ def main(names: list[str]) -> int:
     """Run the pages of these names, or all. Returns: how many failed."""
     failed = 0
     with tempfile.TemporaryDirectory() as scratch:
-        world = Path(scratch) / "world"
-        world.mkdir()
-        make_world(world)
+        world = make_world(Path(scratch) / "world")
+        add_artefacts(world)
         for page in PAGES:
             found = blocks(page)
             if not found or (names and page.name not in names):

@@ -5,13 +5,14 @@ import re
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import click
 import pytest
 from click.testing import CliRunner
 
 from dreammat_cli.main import cli
-from tests.pages import PAGES, ROOT, blocks
+from tests.pages import PAGES, ROOT, blocks, make_world, run
 
 WITHOUT_DRY_RUN = ("doctor", "completion", "report", "eval", "train")
 
@@ -53,6 +54,13 @@ def test_help_ends_with_examples_of_the_command(path: tuple[str, ...], command: 
     assert any(line.strip().startswith(" ".join(("dreammat", *path))) for line in (command.epilog or "").splitlines())
 
 
+def test_a_page_runs_as_it_is_written(tmp_path: Path) -> None:
+    """The cheapest one; `make pages` runs all."""
+    done = run(ROOT / "docs/prompts.md", make_world(tmp_path / "world"), tmp_path / "page")
+    assert done.returncode == 0, done.stdout[-3000:]
+    assert "leather" in done.stdout and (tmp_path / "page/rock/albedo.png").is_file()
+
+
 def test_the_pages_have_blocks_that_run() -> None:
     found = [block for page in PAGES for block in blocks(page)]
     assert sum(not block.why_not for block in found) >= 20 and sum(bool(block.why_not) for block in found) <= 10
@@ -66,11 +74,24 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert (page.parent / target).exists(), f"{page.name}: {target}"
 
 
-def test_pages_that_follow_from_the_code_are_up_to_date() -> None:
+@pytest.fixture(scope="module")
+def reference() -> ModuleType:
+    """docs/reference.py, which writes the pages that follow from the code."""
     spec = importlib.util.spec_from_file_location("reference", ROOT / "docs/reference.py")
     assert spec and spec.loader
-    reference = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(reference)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_error_says_what_was_expected_or_what_to_do(reference: ModuleType) -> None:
+    found = list(reference.messages())
+    assert len(found) > 200
+    told = [text for _, room, text in found if ";" in text or "expected" in text or "⟨hint⟩" in text or room == "train"]
+    assert [text for *_, text in found if text not in told] == []  # those of `train` are reasons in a manifest
+
+
+def test_pages_that_follow_from_the_code_are_up_to_date(reference: ModuleType) -> None:
     for name, text in reference.pages().items():
         assert (ROOT / "docs" / name).read_text() == text, f"docs/{name}: run python docs/reference.py"
 

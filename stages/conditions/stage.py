@@ -189,7 +189,7 @@ def start_folder(out: Path, request: Provenance, force: bool) -> None:
                 shutil.rmtree(folder, ignore_errors=True)
             write_json(out / REQUEST, asked)
     except OSError as error:
-        raise OutputError(f"{out}: cannot be written: {reason(error)}") from error
+        raise OutputError(f"{out}: cannot be written: {reason(error)}; give a folder that can") from error
 
 
 def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: ConditionsOptions) -> None:

@@ -105,7 +105,7 @@ def sha256_file(path: Path) -> str:
             while block := stream.read(1 << 20):
                 digest.update(block)
     except OSError as error:
-        raise InputError(f"{path}: {reason(error)}") from error
+        raise InputError(f"{path}: {reason(error)}; give a file that can be read") from error
     return digest.hexdigest()
 
 
@@ -142,8 +142,9 @@ def written_atomically(path: Path) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
-        hint = "; free some space and run the same command again" if error.errno == errno.ENOSPC else ""
-        raise OutputError(f"{path}: cannot be written: {reason(error)}{hint}") from error
+        full = error.errno == errno.ENOSPC
+        hint = "free some space and run the same command again" if full else "give a place that can"
+        raise OutputError(f"{path}: cannot be written: {reason(error)}; {hint}") from error
     finally:
         with contextlib.suppress(OSError):  # gone when all went well; its folder may never have existed
             temporary.unlink()
@@ -207,6 +208,16 @@ def run_log(artifact: Path) -> Iterator[dict[str, Any]]:
 # ---------------------------------------------------------------------------------------------------- reading
 
 
+MAKER = {"prep": "prep", "conditions": "conditions", "material": "distill", "asset": "bake", "scene": "prep --split"}
+"""The command that writes what is called so."""
+
+
+def wanted(schema: Schema) -> str:
+    """What should be there, and how it is made: "a dreammat.prep artefact, which `dreammat prep` writes"."""
+    maker = MAKER.get(schema.name.removeprefix("dreammat."))
+    return f"a {schema.name} artefact" + (f", which `dreammat {maker}` writes" if maker else "")
+
+
 def load_npz(path: Path, schema: Schema) -> Artifact:
     """Read an NPZ artefact and check it against its schema; it takes no more memory than the file has bytes.
 
@@ -215,11 +226,11 @@ def load_npz(path: Path, schema: Schema) -> Artifact:
     try:
         header = read_member(path, "header")
         if header is None:
-            raise ArtifactError(f"{path}: not a dreammat artefact; expected {schema.name}")
+            raise ArtifactError(f"{path}: not a dreammat artefact; expected {wanted(schema)}")
         provenance = _provenance(path, schema, _parsed(str(header)))
         arrays = read_members(path, {"header", *schema.fields})
     except OSError as error:
-        raise ArtifactError(f"{path}: {reason(error)}; expected a {schema.name} artefact") from error
+        raise ArtifactError(f"{path}: {reason(error)}; expected {wanted(schema)}") from error
     except ForeignMember as error:
         raise ArtifactError(f"{path}: not a {schema.name} artefact: {error}; make it again") from error
     except UNREADABLE as error:
@@ -331,7 +342,7 @@ def read_manifest(folder: Path, schema: Schema) -> tuple[Provenance, dict[str, s
     try:
         header = _parsed(path.read_text(encoding="utf-8"))
     except OSError as error:
-        hint = "an interrupted run continues with the same command" if folder.is_dir() else f"expected {schema.name}"
+        hint = "an interrupted run continues with the same command" if folder.is_dir() else f"expected {wanted(schema)}"
         raise ArtifactError(f"{path}: {reason(error)}; {hint}") from error
     except ValueError as error:
         raise ArtifactError(f"{path}: not readable ({error}); make it again with the stage before") from error
@@ -455,7 +466,7 @@ def read_exr(path: Path) -> ExrImage:
         with open(path, "rb"):
             pass
     except OSError as error:
-        raise ArtifactError(f"{path}: {reason(error)}") from error
+        raise ArtifactError(f"{path}: {reason(error)}; make it again") from error
     source = oiio.ImageInput.open(str(path))
     if source is None:
         raise ArtifactError(f"{path}: not a readable EXR file ({one_line(oiio.geterror())}); make it again")

@@ -60,12 +60,12 @@ def read_image(path: Path) -> NDArray[np.float32]:
     as_stored["oiio:UnassociatedAlpha"] = 1  # else colours come multiplied by alpha
     source = oiio.ImageInput.open(str(path), as_stored)
     if source is None:
-        raise InputError(f"{path}: not a readable picture ({oiio.geterror().strip().splitlines()[0]})")
+        raise InputError(f"{path}: not a readable picture ({oiio.geterror().strip().splitlines()[0]}); save it again")
     pixels = source.read_image("float")
     problem = source.geterror()
     source.close()
     if pixels is None:
-        raise InputError(f"{path}: not a readable picture ({problem.strip()})")
+        raise InputError(f"{path}: not a readable picture ({problem.strip()}); save it again")
     return pixels
 
 

@@ -156,7 +156,7 @@ def _summed(edits: list[EditOptions], told: list[Told]) -> dict[str, Any]:
     """What bake.json says of the edits. Raises: InputError where one changes no texel of any set."""
     for number, edit in enumerate(edits):
         if not any(of.changed[number] for of in told):
-            raise InputError(f"part {', '.join(edit.part)}: shows no texel of any texture; there is nothing to edit")
+            raise InputError(f"part {', '.join(edit.part)}: shows no texel of any texture; name another part")
     return {
         "list": [edit.told() for edit in edits],
         "clamped": {name: sum(of.clamped[name] for of in told) for name in MAPS},

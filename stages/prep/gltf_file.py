@@ -54,7 +54,7 @@ def open_gltf(path: Path) -> Gltf:
         root = json.loads(text)
     except ValueError as error:
         raise InputError(
-            f"{path}: neither GLB nor glTF JSON ({error}); it is cut off or another kind of file"
+            f"{path}: neither GLB nor glTF JSON ({error}); it is cut off or another kind of file, export it again"
         ) from None
     version = root.get("asset", {}).get("version") if isinstance(root, dict) else None
     if not str(version).startswith("2."):
@@ -70,7 +70,7 @@ def _chunks(data: bytes, path: Path) -> tuple[bytes, bytes | None]:
     """JSON and binary chunk of a GLB."""
     length = struct.unpack_from("<I", data, 8)[0] if len(data) >= 20 else len(data) + 1
     if length > len(data):
-        raise InputError(f"{path}: {len(data)} bytes, but its header announces {length}; it is cut off")
+        raise InputError(f"{path}: {len(data)} bytes, but its header announces {length}; it is cut off, export it again")
     chunks: dict[bytes, bytes] = {}
     offset = 12
     while offset + 8 <= length:
@@ -96,7 +96,7 @@ def buffer_bytes(gltf: Gltf, index: int) -> bytes:
             data = read_beside(gltf.path, uri)
         if len(data) < entry["byteLength"]:
             raise InputError(
-                f"{gltf.path}: buffer {index} has {len(data)} of {entry['byteLength']} bytes; it is cut off"
+                f"{gltf.path}: buffer {index} has {len(data)} of {entry['byteLength']} bytes; it is cut off, export it again"
             )
         gltf.buffers[index] = data
     return gltf.buffers[index]

@@ -135,6 +135,8 @@ def morphed(gltf: Gltf, attributes: dict[str, NDArray], targets: list[dict], wei
             if name in result and name.split("_")[0] in ("POSITION", "NORMAL", "TEXCOORD"):
                 shift = accessor(gltf, target[name]).astype(np.float64)
                 if shift.shape != result[name].shape:
-                    raise InputError(f"{gltf.path}: a morph target is {shift.shape}, expected {result[name].shape}")
+                    raise InputError(
+                        f"{gltf.path}: a morph target is {shift.shape}, expected {result[name].shape}; export it again"
+                    )
                 result[name] = result[name] + weight * shift
     return result

@@ -51,7 +51,7 @@ class _Rows:
         if values is None:
             return -1
         if values.shape != shape:
-            raise InputError(f"{path}: a primitive's {what} is {values.shape}, expected {shape}")
+            raise InputError(f"{path}: a primitive's {what} is {values.shape}, expected {shape}; export it again")
         self.blocks.append(values.astype(self.blocks[0].dtype))
         self.count += len(values)
         return self.count - len(values)

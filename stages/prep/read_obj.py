@@ -122,7 +122,7 @@ def _row(row: list[bytes], width: int, least: int, keyword: str, path: Path) -> 
     """One row by itself, to take what stands for not-a-number as such or to say what is wrong."""
     line = text.name(b" ".join([keyword.encode(), *row]))[:60]
     if len(row) < least:
-        raise InputError(f"{path}: '{line}' has {len(row)} numbers, expected {width}; the file is damaged or cut off")
+        raise InputError(f"{path}: '{line}' has {len(row)} numbers, expected {width}; damaged or cut off, export it again")
     values = text.numbers([*row[:width], b"0"][:width])
     if len(values) < width:
         raise InputError(f"{path}: '{line}' is not made of numbers; export the mesh again")
@@ -140,7 +140,7 @@ def _indices(content: _Content, sizes: tuple[int, int, int], path: Path) -> list
             number = np.array(words, dtype="S").astype(np.int64) if words else np.zeros(0, np.int64)
         except ValueError:
             wrong = text.name(next(word for word in words if not word.lstrip(b"+-").isdigit()))
-            raise InputError(f"{path}: a face has the corner '{wrong[:40]}', expected whole numbers") from None
+            raise InputError(f"{path}: a face has the corner '{wrong[:40]}', expected whole numbers; export it again") from None
         row = np.where(number < 0, before[:, column] + number, number - 1)
         named = number != 0
         check_range(row if column == 0 else row[named], size, what, path)

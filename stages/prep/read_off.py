@@ -25,7 +25,9 @@ def read_off(path: Path) -> Source:
             raise ValueError
         positions = np.array([row[:3] for row in table], np.float64).reshape(vertices, 3)
     except (ValueError, IndexError):
-        raise InputError(f"{path}: holds fewer or other values than its counts announce; it is cut off") from None
+        raise InputError(
+            f"{path}: holds fewer or other values than its counts announce; it is cut off, export it again"
+        ) from None
     normals, uv = _attributes(table, bool(kind[3]), bool(kind[1]))
     return _source(positions, normals, uv, [row[1:] for row in rows], path)
 

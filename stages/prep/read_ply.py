@@ -125,7 +125,7 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
     ending = first[1] if first else b"\n"
     end = re.search(b"(?<=" + ending + rb")end_header[ \t]*(" + ending + rb"|$)", data)
     if not first or not end:
-        raise InputError(f"{path}: has no complete PLY header; it is cut off or another kind of file")
+        raise InputError(f"{path}: has no complete PLY header; it is cut off or another kind of file, export it again")
     kind, elements = "", list[_Element]()
     try:
         for line in data[: end.start()].decode("latin-1").split(ending.decode()):
@@ -139,9 +139,11 @@ def _header(data: bytes, path: Path) -> tuple[str, list[_Element], int]:
             elif words[:1] == ["property"]:
                 elements[-1].add(words[2], ("", _TYPES[words[1]]))
     except (IndexError, KeyError, ValueError):
-        raise InputError(f"{path}: its PLY header has the line '{line[:60]}', which is not understood") from None
+        raise InputError(
+            f"{path}: its PLY header has the line '{line[:60]}', which is not understood; export the mesh again"
+        ) from None
     if kind not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise InputError(f"{path}: PLY format '{kind}', expected ascii or binary")
+        raise InputError(f"{path}: PLY format '{kind}', expected ascii or binary; export the mesh again")
     return kind, elements, end.end()
 
 

@@ -61,7 +61,7 @@ def _ascii(data: bytes, path: Path) -> np.ndarray:
         announced = int.from_bytes(data[80:84], "little")
         raise InputError(
             f"{path}: {len(data)} bytes, neither ASCII STL with facets nor binary STL with the {announced} facets "
-            "its header announces; it is empty, cut off or another kind of file"
+            "its header announces; it is empty, cut off or another kind of file, export it again"
         )
     if len(words) % 3:
         raise InputError(f"{path}: {len(words)} corners are not whole triangles; the file is cut off, export it again")

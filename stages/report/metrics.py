@@ -50,7 +50,9 @@ def clip_score(folder: Path, device: torch.device) -> Any:
         processor = CLIPProcessor.from_pretrained(folder, local_files_only=True)
         model = CLIPModel.from_pretrained(folder, local_files_only=True).eval()
     except Exception as error:  # whatever a malformed folder makes the loaders trip over
-        raise InputError(f"--clip {folder}: not a readable CLIP model ({one_line(error)})") from error
+        raise InputError(
+            f"--clip {folder}: not a readable CLIP model ({one_line(error)}); expected a folder as transformers writes it"
+        ) from error
     tools: Any = (_Clip(model), processor)
     return CLIPScore(lambda: tools).to(device)
 
@@ -63,4 +65,6 @@ def frechet_distance(file: Path, device: torch.device) -> Any:
         network = torch.jit.load(file, map_location=device).eval()
         return FrechetInceptionDistance(_Inception(network)).to(device)
     except Exception as error:  # whatever a malformed file, or another kind of network, makes torch trip over
-        raise InputError(f"--inception {file}: not a TorchScript feature network ({one_line(error)})") from error
+        raise InputError(
+            f"--inception {file}: not a TorchScript feature network ({one_line(error)}); expected inception-2015-12-05.pt"
+        ) from error

@@ -171,7 +171,9 @@ def _folder(option: str, source: str, parts: tuple[str, ...]) -> Path:
     try:
         return _download(source, parts)
     except Exception as error:  # the hub's library raises its own, the network's and the file system's
-        raise InputError(f"{option} {source}: no such folder, and the hub does not give it ({one_line(error)})") from error
+        raise InputError(
+            f"{option} {source}: no such folder, and the hub does not give it ({one_line(error)}); give a folder instead"
+        ) from error
 
 
 def _download(model: str, parts: tuple[str, ...]) -> Path:

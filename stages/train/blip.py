@@ -27,7 +27,9 @@ class Captioner:
             self._processor = BlipProcessor.from_pretrained(folder, local_files_only=True)
             self._model = BlipForConditionalGeneration.from_pretrained(folder, local_files_only=True).eval()
         except Exception as error:  # whatever a malformed folder makes the loaders trip over
-            raise InputError(f"--captioner {folder}: not a readable BLIP model ({one_line(error)})") from error
+            raise InputError(
+                f"--captioner {folder}: not a readable BLIP model ({one_line(error)}); expected what transformers writes"
+            ) from error
         if torch.cuda.is_available():
             self._model.cuda()
 

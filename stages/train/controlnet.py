@@ -122,7 +122,7 @@ def accelerator_of(options: TrainControlnetOptions) -> Any:
     try:
         accelerator = Accelerator(mixed_precision=precision)
     except ValueError as error:
-        raise InputError(f"--precision {precision}: not on this machine ({one_line(error)})") from error
+        raise InputError(f"--precision {precision}: not on this machine ({one_line(error)}); choose another") from error
     together = options.at_once * accelerator.num_processes
     if options.batch % together:
         raise InputError(
