@@ -96,6 +96,7 @@ def make_world(folder: Path) -> Path:
     install(folder)
     write_chair(folder / "chair.obj")
     shutil.copy(folder / "chair.obj", folder / "André's chair #2 (50%).obj")
+    (folder / "jobs.csv").write_text("mesh,prompt\nchair.obj,oak\n")
     write_room(folder / "room.glb")
     table = re.search(r"```toml\n(.*?)```", (ROOT / "docs/parts.md").read_text(), re.S)
     assert table
