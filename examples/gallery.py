@@ -31,7 +31,7 @@ PIECES = (
     Piece("vintage_fan.glb", "BabylonJS/MeshesLibrary", "CC BY 4.0", "polished brass", (0, 1),
           (("fanBase_low", ENAMEL), ("#6", ENAMEL), ("fanBlade_low", "polished copper"))),
     Piece("bob_uv.obj", "NVlabs/nvdiffrec", "CC0", "weathered bronze with verdigris in the crevices", (0, 1)),
-    Piece("armchair.obj", "NVIDIAGameWorks/kaolin", "CC BY 4.0", "black steel", (1, 3),
+    Piece("armchair.obj", "NVIDIAGameWorks/kaolin", "CC BY 4.0", "black steel", (0, 1),
           (("M_Armchair_Cushions", "worn brown leather"),)),
     Piece("spot.obj", "odedstein/meshes", "public domain", "white porcelain with cobalt stripes", (1, 1)),
     Piece("plane_holes.obj", "odedstein/meshes", "CC BY 3.0", "olive green paint chipping off aluminium", (0, 3)),
