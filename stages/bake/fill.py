@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
+from stages.core.parallel import cores
+
 NEIGHBOURS = 8
 """Seen points that an unseen one is mixed from."""
 
@@ -30,7 +32,7 @@ def fill_unseen(
     (position, normal), (wanted_position, wanted_normal) = seen, unseen
     count = min(NEIGHBOURS, len(position))
     tree = cKDTree(position, balanced_tree=False, compact_nodes=False)  # far points find their way in a third of the time
-    distance, index = tree.query(wanted_position, k=[*range(1, count + 1)], workers=-1)  # (N, K)
+    distance, index = tree.query(wanted_position, k=[*range(1, count + 1)], workers=cores())  # (N, K)
     agreement = np.einsum("nkd,nd->nk", normal[index], wanted_normal)
     nearest = np.maximum(distance[:, :1], np.finfo(np.float32).tiny)
     weight = np.maximum(agreement, LEAST_AGREEMENT) * (nearest / np.maximum(distance, nearest)) ** 2

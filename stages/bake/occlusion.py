@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from stages.bake.raster import Surface
-from stages.core.parallel import compiled, in_parallel
+from stages.core.parallel import compiled, cores, in_parallel
 from stages.core.progress import Progress
 from stages.light.openness import Lookouts, openness
 from stages.light.scene import Scene
@@ -173,7 +173,7 @@ def _average(
     tree = cKDTree(place[sample], balanced_tree=False, compact_nodes=False)
     owners, of_texel = np.unique(owner, return_inverse=True)
     count = min(NEIGHBOURS, len(sample))
-    reach, near = tree.query(place[owners], [*range(1, count + 1)], workers=-1)
+    reach, near = tree.query(place[owners], [*range(1, count + 1)], workers=cores())
     reach, near = reach[:, -1].astype(np.float32), sample[near]
     unsure = np.zeros(len(asked), bool)
     limits = UNEVEN / rays**0.5, ALIKE / rays**0.5

@@ -17,6 +17,9 @@ from stages.light.reference import reference_transport
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, light_transport
 from stages.prep.options import PrepOptions
+from stages.prep.read_obj import read_obj
+from stages.prep.repair import repair
+from stages.prep.stage import oriented
 from stages.prep.stage import prep as run_prep
 from tests.light import scenes
 from tests.light.test_transport import rmse_percent, stacked
@@ -192,16 +195,17 @@ def test_scale_of_the_source_does_not_matter(scale: float, tmp_path: Path) -> No
     assert float((ours - scaled).square().mean().sqrt()) < 2e-3
 
 
-def of_file(path: Path, tmp_path: Path) -> Scene:
-    """An asset as the stages see it."""
-    run_prep(path, tmp_path / "prep.npz", PrepOptions())
-    with np.load(tmp_path / "prep.npz") as mesh:
-        return Scene(mesh["vertices"], mesh["triangles"], mesh["normals"])
+def of_file(path: Path) -> Scene:
+    """A mesh as prep makes it, but for UVs, which light does not see."""
+    options, source = PrepOptions(), read_obj(path)
+    working = repair(source, options.up, options.weld_tolerance, path)
+    normals, _ = oriented(source, working, options.crease_angle)
+    return Scene(working.vertices, working.triangles, normals)
 
 
-def test_low_poly_posts_and_roof_have_no_black_facets(assets: Path, tmp_path: Path) -> None:
+def test_low_poly_posts_and_roof_have_no_black_facets(assets: Path) -> None:
     """gazebo.obj under an even light: what faces the sky and sees it is lit."""
-    scene = of_file(assets / "meshes" / "gazebo.obj", tmp_path)
+    scene = of_file(assets / "meshes" / "gazebo.obj")
     points = scenes.view_of(scene, 96)
     t = light_transport(scene, points, [scenes.even_light()], STANDARD, 0)[0]
     hemisphere = open_share(scene, points)
@@ -220,9 +224,9 @@ def open_share(scene: Scene, points: GBuffer) -> NDArray[np.float64]:
     return share / 256
 
 
-def test_open_surface_seen_from_behind(assets: Path, tmp_path: Path) -> None:
+def test_open_surface_seen_from_behind(assets: Path) -> None:
     """plane_holes.obj: the back of a sheet is shaded as a surface that faces the viewer."""
-    scene = of_file(assets / "meshes" / "plane_holes.obj", tmp_path)
+    scene = of_file(assets / "meshes" / "plane_holes.obj")
     points = scenes.view_of(scene, 96, eye=(-1.5, 2.2, -1.3))
     assert ((points.n * points.wo).sum(-1) > 0).all()
     t = light_transport(scene, points, [scenes.even_light()], STANDARD, 0)[0]
