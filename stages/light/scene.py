@@ -4,6 +4,7 @@ A miss is a mask, never a distance. Rays are float32; the mesh is the normalised
 in world units serves every source scale.
 """
 
+import functools
 from copy import copy
 from dataclasses import dataclass
 from threading import Lock
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 
 from stages.light.emission import Emission
 from stages.light.normal_maps import NormalMaps
+from stages.light.outermost import outermost
 
 OFFSET = 2e-5
 """Distance by which a secondary ray's origin is lifted off the surface, in world units (object size 1)."""
@@ -89,6 +91,12 @@ class Scene:
             vertices = np.concatenate([self.vertices, self._casters[0]]).astype(np.float32)
             triangles = np.concatenate([self.triangles, self._casters[1] + len(self.vertices)]).astype(np.int32)
             self._any = _Tree(vertices, triangles, robust=False)
+
+    @functools.cached_property
+    def outermost(self) -> NDArray[np.bool_]:
+        """Whether nothing stands over a triangle's plane, in front of it and behind it: (F, 2)."""
+        others = np.zeros((0, 3), np.float32) if self._casters is None else self._casters[0]
+        return outermost(self.vertices, self.triangles, others)
 
     def intersect(self, origins: NDArray, directions: NDArray) -> Hits:
         """Closest hit of each ray. Args: (R, 3) each; directions need not be unit: t is in their length."""

@@ -14,6 +14,8 @@ every term, every roughness and every environment:
   multiplied by the exact unoccluded albedo, so an evenly lit open point has no error at all;
 - what rises above the bound (a sun, a lamp) has rays of its own, aimed at what the point would reflect most of, and
   combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles;
+- where nothing at all stands over the plane of a point's triangle, as on what is convex, no ray is traced
+  (`stages.light.outermost`);
 - neighbouring pixels use complementary samples; the points that turn out noisiest trace more, towards the lights that make
   them so; and what noise is left is averaged over neighbours that do not differ by more than it
   (`stages.light.reconstruction`), less the highlights that a lamp would make in the open (`stages.light.highlights`), which
@@ -47,7 +49,18 @@ from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
 from stages.light.terms import GLTF, Terms
-from stages.light.transport_kernels import CLASSES, GOLDEN, accumulate, aim, draw, hashed, interleaved_shifts, mirror, settle
+from stages.light.transport_kernels import (
+    CLASSES,
+    GOLDEN,
+    accumulate,
+    aim,
+    draw,
+    hashed,
+    interleaved_shifts,
+    mirror,
+    settle,
+    to_trace,
+)
 
 TILE = 512
 """Points a thread takes at once: their rays stay in its cache."""
@@ -257,7 +270,7 @@ def _tile(
     chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
     aim(n, wo, wanted[part], AIM, (cells.direction, cells.radius, cells.energy, cells.first), chosen, aimed)
     drawn = rays.draw(frame, wo, starts(points, part), pixel, alphas, lights, chosen)
-    occluded = scene.occluded(drawn.origin, drawn.direction)
+    occluded = blocked(scene, points, part, drawn)
     excess = (lights.fine, lights.block, lights.texels.radiance, rays.density, cells.number, aimed)
     seen = (lights.pyramid, lights.level_start, *excess)
     sampled = (rays.counts, rays.bounds, rays.slots, terms.principled)
@@ -268,6 +281,23 @@ def _tile(
     weights = np.stack(terms.mirror_weights(cosine))
     for e, environment in enumerate(lights.environments):
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
+
+
+OUTER = 0.1
+"""Least share of a tile's points that lie outermost for which rays are sorted."""
+
+
+def blocked(scene: Scene, points: GBuffer, part: NDArray, drawn: "Drawn") -> NDArray[np.bool_]:
+    """Which rays (R,) of a tile anything blocks; those are not traced that rise where nothing stands over the plane."""
+    ng, triangle = points.ng[part], points.triangle[part]
+    behind = (ng * scene.geometric_normal(triangle)).sum(-1) < 0
+    outer = scene.outermost[triangle, behind.astype(np.int64)]
+    if outer.mean() < OUTER:
+        return scene.occluded(drawn.origin, drawn.direction)
+    asked = np.flatnonzero(to_trace(drawn.direction, drawn.row, ng, outer))
+    result = np.zeros(len(drawn.direction), np.bool_)
+    result[asked] = scene.occluded(drawn.origin[asked], drawn.direction[asked])
+    return result
 
 
 def starts(points: GBuffer, part: NDArray) -> tuple[NDArray, NDArray, NDArray]:

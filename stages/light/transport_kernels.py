@@ -231,6 +231,24 @@ def settle(origin, direction, row, surface, ng):  # type: ignore[no-untyped-def]
 
 
 @fast
+def to_trace(direction, row, ng, outer):  # type: ignore[no-untyped-def]
+    """Which rays (R,) may meet something: all but those that rise from points over whose plane there is nothing.
+
+    Args:
+        direction: (R, 3). row: (P, S) of a `Drawn`. ng: (P, 3). outer: (P,) bool.
+    """
+    result = np.ones(len(direction), np.bool_)
+    for p in range(len(row)):
+        if outer[p]:
+            for s in range(row.shape[1]):
+                r = row[p, s]
+                if r >= 0:
+                    cosine = direction[r, 0] * ng[p, 0] + direction[r, 1] * ng[p, 1] + direction[r, 2] * ng[p, 2]
+                    result[r] = cosine <= np.float32(0)
+    return result
+
+
+@fast
 def _choose_cells(pixel, samples, excess, chosen, lobes, jitter):  # type: ignore[no-untyped-def]
     """The cell of each light ray, or -1, and how far into that cell's share its sample lies: (P, light rays) each."""
     slots, shift, _, _, seed = samples
