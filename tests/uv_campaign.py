@@ -1,7 +1,7 @@
 """Models in the ways in which artists lay out UVs, from prep to the picture, beside Blender: `make uvs`.
 
-Each keeps its UVs bit for bit in model.glb (and model.obj), or it is said why not; with a Python that has bpy, Cycles shows what
-preview.png shows. That stacked islands are as crisp as unstacked ones: `tests/test_shared_texels.py`.
+Each keeps its UVs bit for bit in model.glb (and model.obj), or it is said why not; with a Python that has bpy, Cycles shows
+what preview.png shows. That stacked islands are as crisp as unstacked ones: `tests/test_shared_texels.py`.
 """
 
 import argparse
