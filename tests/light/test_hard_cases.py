@@ -120,8 +120,9 @@ def test_coarse_smooth_sphere_has_no_black_facets() -> None:
 def test_duplicate_faces_do_not_shadow_themselves() -> None:
     base = scenes.sphere(3)
     scene = Scene(base.vertices, np.concatenate([base.triangles] * 2), np.concatenate([base.normals] * 2))
-    points = scenes.view_of(scene, 24)
-    once, twice = (light_transport(s, points, [scenes.even_light()], QUALITY["draft"], 0)[0].E for s in (base, scene))
+    once, twice = (
+        light_transport(s, scenes.view_of(s, 24), [scenes.even_light()], QUALITY["draft"], 0)[0].E for s in (base, scene)
+    )
     assert torch.equal(once, twice)
 
 
