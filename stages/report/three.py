@@ -1,6 +1,9 @@
-"""What headless Chromium draws of an asset with three.js: its standard material and image-based lighting, no tone mapping.
+"""What headless Chromium draws of an asset with three.js: its standard material, no tone mapping.
 
-A server of this process gives the page what it loads, from this machine alone, and takes the pixels back.
+The sun and other lamps of preview_light.exr are directional lights, the rest is the scene's environment, as in scenes made for
+three.js: it prefilters environments for a viewer who looks straight at a surface, which makes a lamp's highlight on a slanted
+one too wide (`docs/numbers.md` says by how much). A server of this process gives the page what it loads, from this machine
+alone, and takes the pixels back.
 """
 
 import json
@@ -17,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.errors import InputError
+from stages.light.environment import Environment, directions_of_texels, load_environment, save_environment
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
@@ -25,6 +29,12 @@ SUPERSAMPLE = 4
 
 SECONDS = 300
 """A page that has not drawn by then will not."""
+
+LAMP = 20.0
+"""Times the mean radiance from which on a texel of the light is a lamp's."""
+
+LAMPS = 64
+"""Directional lights at most, the brightest; three.js has room for as many."""
 
 PAGE = """<!doctype html><script type="importmap">
 {"imports": {"three": "/modules/three/build/three.module.js", "three/addons/": "/modules/three/examples/jsm/"}}
@@ -39,9 +49,14 @@ try {
   renderer.setClearColor(0, 0);
   const target = new THREE.WebGLRenderTarget(side, side, { type: THREE.FloatType, colorSpace: THREE.LinearSRGBColorSpace });
   const scene = new THREE.Scene();
-  const light = await new EXRLoader().setDataType(THREE.FloatType).loadAsync("/asset/preview_light.exr");
+  const light = await new EXRLoader().setDataType(THREE.FloatType).loadAsync("/light/rest.exr");
   light.mapping = THREE.EquirectangularReflectionMapping;
   scene.environment = new THREE.PMREMGenerator(renderer).fromEquirectangular(light).texture;
+  for (const [direction, irradiance] of job.lamps) {
+    const lamp = new THREE.DirectionalLight(new THREE.Color().setRGB(...irradiance));
+    lamp.position.set(...direction);
+    scene.add(lamp);
+  }
   scene.add((await new GLTFLoader().loadAsync("/asset/model.glb")).scene);
   for (const [k, view] of job.views.entries()) {
     const camera = new THREE.PerspectiveCamera(job.fov_y * 180 / Math.PI, 1, view.near, view.far);
@@ -85,8 +100,9 @@ class Handler(SimpleHTTPRequestHandler):
             self.desk.pictures.append(np.frombuffer(body, "<f4"))
 
     def translate_path(self, path: str) -> str:
-        """Only what lies in the asset or in the module three."""
-        for prefix, folder in (("/asset/", self.desk.asset), ("/modules/three/", self.desk.modules / "three")):
+        """Only what lies in the asset, beside the divided light, or in the module three."""
+        desk = self.desk
+        for prefix, folder in (("/asset/", desk.asset), ("/light/", desk.light), ("/modules/three/", desk.modules / "three")):
             found = (folder / path.removeprefix(prefix)).resolve()
             if path.startswith(prefix) and found.is_relative_to(folder.resolve()):
                 return str(found)
@@ -106,8 +122,8 @@ class Handler(SimpleHTTPRequestHandler):
 class Desk:
     """What one page needs, and what it has sent."""
 
-    def __init__(self, modules: Path, asset: Path, job: dict[str, Any]) -> None:
-        self.modules, self.asset, self.job = modules, asset, job
+    def __init__(self, modules: Path, asset: Path, light: Path, job: dict[str, Any]) -> None:
+        self.modules, self.asset, self.light, self.job = modules, asset, light, job
         self.pictures: list[NDArray[np.float32]] = []
         self.problem, self.done = "", threading.Event()
 
@@ -126,9 +142,40 @@ def draw(modules: str, asset: Path, views: list[dict[str, Any]], studio: dict[st
         raise InputError(f"no browser ({', '.join(BROWSERS)}); install Chromium")
     if not (Path(modules) / "three" / "build" / "three.module.js").is_file():
         raise InputError(f"{modules}: has no three; expected the folder node_modules in which npm has installed it")
+    light, lamps = divided(load_environment(asset / "preview_light.exr")[0])
     job = {"size": studio["size"], "supersample": SUPERSAMPLE, "fov_y": studio["fov_y"], "views": [_reach(v) for v in views]}
-    desk = Desk(Path(modules), asset, job)
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, desk)) as server, tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryDirectory() as profile:
+        save_environment(Path(folder) / "rest.exr", light)
+        desk = Desk(Path(modules), asset, Path(folder), job | {"lamps": lamps})
+        pictures = _served(desk, browser, profile)
+    return [_halved(pixels, studio["size"]) for pixels in pictures]
+
+
+def divided(light: Environment) -> tuple[Environment, list[tuple[list[float], list[float]]]]:
+    """A light as three.js takes it best. Args: light: its middle column towards glTF's +x, as preview_light.exr.
+
+    Returns:
+        the environment without what is brighter than LAMP times its mean; of each lamp the direction towards it, glTF's frame,
+        and the irradiance that it gives a surface which faces it, RGB.
+    """
+    towards, solid_angle = directions_of_texels(*light.radiance.shape[:2])
+    brightness = light.radiance.mean(-1)
+    most = LAMP * np.average(brightness, axis=0, weights=solid_angle).mean()
+    brightest = np.argsort(brightness, axis=None)[: -LAMPS - 1 : -1]
+    row, column = np.unravel_index(brightest[brightness.flat[brightest] > most], brightness.shape)
+    there = light.radiance[row, column].astype(np.float64)
+    rest = there * most / brightness[row, column, None]
+    irradiance = (there - rest) * solid_angle[row, None]
+    x, y, z = towards[row, column].T  # its middle column is +x here too; up is z, and columns run clockwise
+    environment = light.radiance.copy()
+    environment[row, column] = rest
+    lamps = list(zip(np.stack([x, z, -y], 1).tolist(), irradiance.tolist(), strict=True))
+    return Environment(light.name, environment), lamps
+
+
+def _served(desk: Desk, browser: str, profile: str) -> list[NDArray[np.float32]]:
+    """What the page draws. Args: profile: a folder for the browser. Raises: InputError."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, desk)) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         flags = ["--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
         command = [browser, *flags, f"--user-data-dir={profile}", f"http://127.0.0.1:{server.server_port}/"]
@@ -139,7 +186,7 @@ def draw(modules: str, asset: Path, views: list[dict[str, Any]], studio: dict[st
         server.shutdown()
     if desk.problem or not finished:
         raise InputError(f"{browser}: {desk.problem or 'nothing drawn'}; expected WebGL 2 and three 0.150 or newer")
-    return [_halved(pixels, studio["size"]) for pixels in desk.pictures]
+    return desk.pictures
 
 
 def _reach(view: dict[str, Any]) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from stages.core.color import srgb_encode
 from stages.core.errors import ArtifactError, InputError
 from stages.core.images import write_png
 from stages.core.schemas import ASSET
+from stages.light.environment import Environment, directions_of_texels
 from stages.report import preview, three
 from stages.report.options import PreviewReportOptions
 from stages.report.preview import VIEWS, report_preview
@@ -85,6 +86,31 @@ def test_two_assets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert [row.asset for row in rows] == ["urn"] * 3 + ["egg"] * 3
     with pytest.raises(InputError, match="two assets of one name"):
         report_preview(assets[:1] * 2, tmp_path / "out", PreviewReportOptions(cycles="python"))
+
+
+def test_a_sun_becomes_lamps_that_bring_the_light_that_they_take() -> None:
+    """three.js looks a direction (x, y, z) up at column W (0.5 + atan2(z, x) / 2 pi), row H (0.5 - asin(y) / pi)."""
+    radiance = np.full((32, 64, 3), 0.5, np.float32)
+    sun = {(9, 50): (600.0, 500.0, 300.0), (20, 3): (200.0, 200.0, 250.0)}
+    for texel, colour in sun.items():
+        radiance[texel] = colour
+    rest, lamps = three.divided(Environment("sunny", radiance))
+    found = {
+        (int(32 * (0.5 - np.arcsin(y) / np.pi)), int(64 * (0.5 + np.arctan2(z, x) / (2 * np.pi)))): irradiance
+        for (x, y, z), irradiance in lamps
+    }
+    assert found.keys() == sun.keys()
+    solid_angle = directions_of_texels(32, 64)[1]
+    for (row, column), irradiance in found.items():
+        left = rest.radiance[row, column]
+        assert left.mean() < 30 and irradiance == pytest.approx((radiance[row, column] - left) * solid_angle[row], rel=1e-5)
+    assert (np.delete(rest.radiance.reshape(-1, 3), [9 * 64 + 50, 20 * 64 + 3], 0) == 0.5).all()
+
+
+def test_an_even_sky_has_no_lamps() -> None:
+    light = Environment("grey", np.full((8, 16, 3), 0.7, np.float32))
+    rest, lamps = three.divided(light)
+    assert not lamps and (rest.radiance == light.radiance).all()
 
 
 def test_what_cannot_be_compared_is_said_in_one_line(tmp_path: Path) -> None:
