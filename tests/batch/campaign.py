@@ -1,8 +1,10 @@
 """Tiny jobs on the workflow, killed in the middle and run again: the same bytes as by hand, and nothing done twice.
 
-    python -m tests.batch.campaign [--jobs 4] [--kills 1] [--folder FOLDER]
+    python -m tests.batch.campaign [--jobs 4] [--kills 1] [--distinct 4] [--folder FOLDER]
 
-Beside the jobs stands one with a broken mesh, which must fail alone.
+Jobs repeat the distinct ones, which are also done by hand, so that every job's bytes are compared. What the engine costs is
+the CPU time of the whole without that of the commands that it runs. Beside the jobs stands one with a broken mesh, which must
+fail alone.
 """
 
 import argparse
@@ -10,6 +12,7 @@ import base64
 import os
 import random
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -27,7 +30,7 @@ TINY = {
     "prep": "--texture-size 64 --padding 2 --unwrap-triangles 0",
     "conditions": "--views 3 --size 16 --env overcast --quality draft",
     "distill": "--steps 1",
-    "bake": "--size 512 --preview-size 32 --occlusion-rays 1",
+    "bake": "--size 512 --supersample 1 --relief 0 --preview-size 32 --occlusion-rays 1",
 }
 PROMPTS = ("copper", "oak", "red plastic", "granite", "rust")
 A_MESH = 2
@@ -39,13 +42,16 @@ MESHES = 10
 TWICE = re.compile(r"^Finished jobid: \d+ \(Rule: (prep|conditions|distill|bake)\)", re.M)
 
 
-def write_jobs(folder: Path, count: int, broken: bool = True) -> Path:
-    """A jobs file with so many jobs, and their meshes."""
-    meshes = [f"mesh_{i}.obj" for i in range(min(MESHES, -(-count // A_MESH)))]
+def write_jobs(folder: Path, count: int, distinct: int | None = None, broken: bool = True) -> Path:
+    """A jobs file with so many jobs, and their meshes. Args: distinct: jobs after so many repeat the first; all by default."""
+    distinct = distinct or count
+    meshes = [f"mesh_{i}.obj" for i in range(min(MESHES, -(-distinct // A_MESH)))]
     for i, name in enumerate(meshes):
-        cube_sphere(folder / name, 3 + i % 3)
-    rows = [f"{name},{mesh},{prompt},{seed},{','.join(TINY.values())}" for name, mesh, prompt, seed in (
-        (f"job_{k}", meshes[k % len(meshes)], PROMPTS[k % len(PROMPTS)], k) for k in range(count))]  # fmt: skip
+        cube_sphere(folder / name, 3 + i)
+    rows = [
+        f"job_{k},{meshes[one % len(meshes)]},{PROMPTS[one % len(PROMPTS)]},{one},{','.join(TINY.values())}"
+        for k, one in ((k, k % distinct) for k in range(count))
+    ]
     if broken:
         (folder / "broken.obj").write_text("v 0 0\nf 1 2 3\n")
         rows.append(f"broken,broken.obj,oak,0,{','.join(TINY.values())}")
@@ -60,19 +66,28 @@ def engine(jobs: Path, *words: str) -> list[str]:
     return [sys.executable, "-m", "snakemake", *where, "--directory", str(jobs.parent), *words, "--config", f"jobs={jobs}"]
 
 
-def environment() -> dict[str, str]:
-    """With this checkout in front."""
-    return {**os.environ, "PYTHONPATH": str(ROOT)}
+CLOCK = """import atexit, os, sys
+def write():
+    used = os.times()
+    with open({path!r}, "a") as file:
+        file.write(f"{{used.user + used.system + used.children_user + used.children_system}}\\n")
+if "dreammat_cli" in sys.orig_argv:
+    atexit.register(write)
+"""
+"""A sitecustomize.py: each command that comes to its end notes its CPU seconds in a file."""
 
 
-def run_until(jobs: Path, share: float) -> str:
-    """Run the workflow until a share of its outputs is there, then kill it and everything that it started."""
+def environment(clock: Path | None = None) -> dict[str, str]:
+    """With this checkout in front. Args: clock: a folder with a CLOCK."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join([*([str(clock)] if clock else []), str(ROOT)])}
+
+
+def run_until(jobs: Path, share: float, clock: Path) -> str:
+    """Run the workflow until a share of its outputs is there, then kill it and everything that it started. Returns: its log."""
     done = every_output(jobs)
     log = jobs.with_name("log.txt")
     with open(log, "w") as stream:
-        process = subprocess.Popen(
-            engine(jobs), env=environment(), stdout=stream, stderr=stream, start_new_session=True
-        )
+        process = subprocess.Popen(engine(jobs), env=environment(clock), stdout=stream, stderr=stream, start_new_session=True)
         while process.poll() is None and sum(path.exists() for path in done) < share * len(done):
             time.sleep(0.5)
         running = process.poll() is None
@@ -105,8 +120,15 @@ def times(jobs: Path) -> dict[Path, int]:
     return found
 
 
+def cpu() -> float:
+    """CPU seconds of all processes that this one has waited for, and theirs; what died with its parent is not in them."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def by_hand(jobs: list[Job], folder: Path) -> None:
     """The same with the four commands, one after the other."""
+
     def dreammat(*words: str) -> None:
         subprocess.run([sys.executable, "-m", "dreammat_cli", *words, "-q"], env=environment(), check=True)
 
@@ -132,7 +154,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--jobs", type=int, default=4)
     parser.add_argument("--kills", type=int, default=1)
-    parser.add_argument("--by-hand", type=int, default=4, help="jobs that are also done by hand, to compare")
+    parser.add_argument("--distinct", type=int, default=4, help="jobs after so many repeat the first")
     parser.add_argument("--folder", type=Path, help="where; kept afterwards")
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as scratch:
@@ -140,38 +162,59 @@ def main() -> None:
 
 
 def campaign(chosen: argparse.Namespace, folder: Path) -> None:
-    """Write jobs, run them through kills, compare."""
+    """Write jobs, run them by hand and through kills, compare."""
     folder.mkdir(parents=True, exist_ok=True)
-    jobs = write_jobs(folder.resolve(), chosen.jobs)
-    twice = 0
-    for kill in range(chosen.kills):
-        log = run_until(jobs, (kill + 1) / (chosen.kills + 1.5))
-        before = times(jobs)
-        print(f"killed: {len(TWICE.findall(log))} commands had been done since the last time", flush=True)
-    last = subprocess.run(engine(jobs), env=environment(), capture_output=True, text=True)
-    assert last.returncode == 1, f"the broken mesh should fail the whole at its end:\n{last.stderr[-2000:]}"
-    after = times(jobs)
-    twice = sum(after.get(path) != then for path, then in before.items())
+    jobs = write_jobs(folder.resolve(), chosen.jobs, chosen.distinct)
+    once = [job for job in read(jobs)[0] if job.name != "broken"][: chosen.distinct]
+    by_hand(once, folder / "by_hand")
+    clock = folder.resolve() / "clock"
+    clock.mkdir()
+    (clock / "sitecustomize.py").write_text(CLOCK.format(path=str(clock / "seconds")))
+    begin = cpu()
+    twice = through_kills(jobs, chosen.kills, clock)
+    whole, commands = cpu() - begin, sum(map(float, (clock / "seconds").read_text().split()))
     told = (jobs.with_suffix("") / "summary.csv").read_text().splitlines()
     states = [line.split(",")[1] for line in told[1:]]
     assert states == ["done"] * chosen.jobs + ["failed"], "\n".join(told)
     assert "broken,failed,prep," in told[-1] and "broken.obj" in told[-1], told[-1]
-    changed = jobs.read_text().replace(",copper,", ",brass,", 1)
-    jobs.write_text(changed)
-    again = subprocess.run(engine(jobs, "-n"), env=environment(), capture_output=True, text=True).stdout
-    counts = {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", again, re.M)}
-    left = {"prep": 1, "conditions": 1, "distill": 2, "bake": 2}  # of the broken one, and what a prompt brings with it
-    assert {rule: counts.get(rule) for rule in left} == left, again
-    jobs.write_text(changed.replace(",brass,", ",copper,", 1))
-    sample = [job for job in read(jobs)[0] if job.name != "broken"][:: max(1, chosen.jobs // chosen.by_hand)]
-    by_hand(sample, folder / "by_hand")
-    found, expected = artefacts(jobs.with_suffix("")), artefacts(folder / "by_hand")
-    differing = [name for name, digest in expected.items() if found.get(name) != digest]
+    look_after_changed_prompt(jobs)
+    found, known = artefacts(jobs.with_suffix("")), artefacts(folder / "by_hand")
+    due = known | {
+        name.replace(f"{first.name}/", f"job_{k}/", 1): digest
+        for k, first in ((k, once[k % len(once)]) for k in range(len(once), chosen.jobs))
+        for name, digest in known.items() if name.startswith(f"{first.name}/")
+    }  # fmt: skip
+    differing = [name for name in due | found if found.get(name) != due.get(name)]
     assert not differing, f"other bytes than by hand: {', '.join(differing[:5])}"
     print(f"{chosen.jobs} jobs done, the broken one failed alone; a changed prompt would redo distill and bake of its job")
-    print(f"{len(expected)} files of {len(sample)} jobs have the bytes that they have by hand")
+    print(f"{len(due)} files of {chosen.jobs} jobs have the bytes that they have by hand")
+    print(f"CPU: {whole:.0f} s, of which the commands {commands:.0f} s: the engine adds {whole / commands - 1:.1%}")
     print(f"done twice: {twice or 'nothing'}", flush=True)
     assert not twice
+
+
+def through_kills(jobs: Path, kills: int, clock: Path) -> int:
+    """Run the workflow to its end, killed so often on the way. Returns: how many files were made twice."""
+    before: dict[Path, int] = {}
+    for kill in range(kills):
+        log = run_until(jobs, (kill + 1) / (kills + 1.5), clock)
+        before = times(jobs) | before
+        print(f"killed: {len(TWICE.findall(log))} commands had been done since the last time", flush=True)
+    last = subprocess.run(engine(jobs), env=environment(clock), capture_output=True, text=True)
+    assert last.returncode == 1, f"the broken mesh should fail the whole at its end:\n{last.stderr[-2000:]}"
+    after = times(jobs)
+    return sum(after.get(path) != then for path, then in before.items())
+
+
+def look_after_changed_prompt(jobs: Path) -> None:
+    """The engine would redo distill and bake of the job whose prompt changes, and the broken job."""
+    text = jobs.read_text()
+    jobs.write_text(text.replace(",copper,", ",brass,", 1))
+    again = subprocess.run(engine(jobs, "-n"), env=environment(), capture_output=True, text=True).stdout
+    jobs.write_text(text)
+    counts = {rule: int(count) for rule, count in re.findall(r"^(\w+) +(\d+)$", again, re.M)}
+    left = {"prep": 1, "conditions": 1, "distill": 2, "bake": 2}
+    assert {rule: counts.get(rule) for rule in left} == left, again
 
 
 if __name__ == "__main__":
