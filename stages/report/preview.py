@@ -127,12 +127,13 @@ def psnr(a: np.ndarray, b: np.ndarray, on: np.ndarray) -> float:
     return float(-10 * np.log10(np.square(a[on] - b[on]).mean()))
 
 
-def in_blender(python: str, asset: Path, views: list[dict], studio: dict) -> list[np.ndarray]:
-    """The views in Cycles: radiance and alpha (S, S, 4), premultiplied. Raises: InputError."""
+def in_blender(python: str, asset: Path, views: list[dict], studio: dict, model: str = "model.glb") -> list[np.ndarray]:
+    """The views in Cycles: radiance and alpha (S, S, 4), premultiplied. Args: model: .glb or .obj. Raises: InputError."""
     from stages.core.errors import InputError
 
     with tempfile.TemporaryDirectory() as folder:
-        job = {"views": [view["c2w"] for view in views], "size": studio["size"], "fov_y": studio["fov_y"]}
+        size, fov_y = studio["size"], studio["fov_y"]
+        job = {"model": model, "views": [view["c2w"] for view in views], "size": size, "fov_y": fov_y}
         (Path(folder) / "job.json").write_text(json.dumps(job))
         try:
             subprocess.run([python, __file__, str(asset), folder], check=True, capture_output=True)
@@ -155,7 +156,8 @@ def cycles(asset: str, folder: str) -> None:
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
     scene.cycles.max_bounces, scene.cycles.samples, scene.cycles.pixel_filter_type = 0, SAMPLES, "BOX"
-    bpy.ops.import_scene.gltf(filepath=str(Path(asset) / "model.glb"))
+    load = bpy.ops.wm.obj_import if job["model"].endswith(".obj") else bpy.ops.import_scene.gltf
+    load(filepath=str(Path(asset) / job["model"]))
     for material in bpy.data.materials:
         material.cycles.emission_sampling = "NONE"  # else each triangle that might shine takes samples from the light
         for node in material.node_tree.nodes if material.use_nodes else ():
