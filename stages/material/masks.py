@@ -15,11 +15,20 @@ from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
 from stages.material.surface import Array, Surface
 
-SIDES = ("below", "above", "front", "back", "left", "right", "fade")
+SIDES = ("below", "above", "middle", "front", "back", "left", "right", "sides", "badge", "fade")
 """Kinds that cover a share of the extent, not of the surface."""
 
 DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "zigzag", "spots", "dots", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
+
+CENTRED = ("middle", "sides", "badge")
+"""Those of them about the middle of what they lie on."""
+
+FACING = 0.4
+"""How far what bears a badge must face the front: the cosine."""
+
+STEEP = 10.0
+"""How much farther away what lies behind or faces aside counts."""
 
 LEAST = {"edges": 0.08, "crevices": 0.08, "hidden": 0.06, "up": 0.25, "down": 0.25}
 """Least of their fields that counts as an edge, a crease, hidden from the sky, facing up or down: a sphere has none of the
@@ -78,6 +87,8 @@ def _chance(mask: Mask) -> Spectrum:
 def signal(mask: Mask, surface: Surface, at: Place) -> Array:
     """The field of a mask, (P,): larger where the layer lies."""
     x, y, z = at.p
+    if mask.kind in CENTRED:
+        return _centred(mask, surface, at)
     if mask.kind in SIDES:
         return {"below": -z, "above": z, "fade": z, "front": x, "back": -x, "left": y, "right": -y}[mask.kind]
     if mask.kind == "along":
@@ -112,6 +123,18 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
         return fbm(at, _chance(mask), 7) + strength
     bent = warped(at, 0.3 * mask.size, mask.size, 3) if mask.kind == "patches" else at
     return fbm(bent, _chance(mask), 7)
+
+
+def _centred(mask: Mask, surface: Surface, at: Place) -> Array:
+    """How far inside of a level band about the middle, or of a squarish badge on the front, at most 0; or how far out to the
+    sides. (P,) object sizes."""
+    away = at.p - np.array(mask.axis or (0, 0, 0), np.float32)[:, None]
+    if mask.kind == "middle":
+        return -abs(away[2])
+    if mask.kind == "sides":
+        return abs(away[1])
+    behind = np.float32(STEEP) * (np.maximum(-away[0], 0) + np.maximum(np.float32(FACING) - surface.normal[:, 0], 0))
+    return -((away[1] ** 4 + away[2] ** 4) ** np.float32(0.25)) - behind
 
 
 def _middle(phase: Array) -> Array:
@@ -177,6 +200,13 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
             return part
         if mask.draw >= 0:
             mask = replace(mask, draw=31 * recipe.seed + mask.draw)
+        if mask.kind in CENTRED:
+            x, y, z = ((place.p.min(1) + place.p.max(1)) / 2).tolist()
+            tall, wide = np.ptp(place.p[2]), np.ptp(place.p[1])
+            if mask.kind == "sides":
+                return replace(mask, axis=(x, y, z), level=0.5 * (1 - mask.share) * float(wide))
+            reach = 0.5 * mask.share * float(tall if mask.kind == "middle" else min(tall, wide))
+            return replace(mask, axis=(x, y, z), level=-reach)
         value = signal(mask, surface, _drawn(mask, place))
         if mask.kind in SIDES:  # a share of the extent, not of the area
             low, high = float(value.min()), float(value.max())

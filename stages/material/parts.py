@@ -17,6 +17,10 @@ LEGS = ("leg", "legs", "foot", "feet")
 HANDLES = ("handle", "handles", "grip", "hilt", "haft", "shaft")
 HEADS = ("blade", "blades", "head")
 SPOUTS = ("spout",)
+GUARDS, POMMELS = ("guard", "crossguard", "cross-guard", "tsuba", "quillons", "bolster"), ("pommel",)
+ENDS = ("end",)
+SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS)
+"""Names of parts that are looked for in the shape of a thing."""
 
 SAMPLED, NEAR = 3000, 160
 """Points whose thickness is measured, and neighbours among which the other side is looked for."""
@@ -52,6 +56,10 @@ def found(mask: Mask, surface: Surface) -> Mask | None:
         return None
     if word in LEGS:
         return _thin_pieces(mask, surface) or _under(mask, surface)
+    if word in ENDS:
+        return _at_end(mask, surface)
+    if word in GUARDS + POMMELS:
+        return _by_handle(mask, surface, word in GUARDS)
     if word in HANDLES + HEADS + SPOUTS:
         end = _end(surface) if word not in SPOUTS else None
         if end is None:
@@ -139,6 +147,30 @@ def _end(surface: Surface) -> tuple[NDArray, float] | None:
         return None
     axis = axes[:, 2] if after else -axes[:, 2]
     return axis, (1 if after else -1) * float(edges[cut]) + float(centre @ axis)
+
+
+GUARD, POMMEL, END = 0.04, 0.07, 0.25
+"""Shares of a long thing's length: of its guard, which lies on the blade's side of the handle, its pommel, and one end."""
+
+
+def _by_handle(mask: Mask, surface: Surface, guard: bool) -> Mask | None:
+    """A guard with all that is beyond it, for the handle lies over that; or the last of a handle."""
+    end = _end(surface)
+    if end is None:
+        return None
+    axis, level = end
+    along = surface.point @ axis
+    length = float(np.ptp(along))
+    return _beyond(mask, axis, level - GUARD * length if guard else float(along.max()) - POMMEL * length)
+
+
+def _at_end(mask: Mask, surface: Surface) -> Mask:
+    """The upper end along a thing's longest direction, or the one in front where it lies."""
+    away = (surface.point - surface.point.mean(0)).astype(np.float64)
+    axis = np.linalg.eigh(away.T @ away)[1][:, 2]
+    axis = axis * np.sign(axis[np.argmax(abs(axis))])
+    along = surface.point @ axis
+    return _beyond(mask, axis, float(along.max()) - END * float(np.ptp(along)))
 
 
 def _outside(mask: Mask, surface: Surface, spout: bool) -> Mask | None:

@@ -9,7 +9,8 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 KINDS = (
-    "all", "below", "above", "front", "back", "left", "right", "fade", "edges", "crevices", "up", "down", "hidden",
+    "all", "below", "above", "middle", "front", "back", "left", "right", "sides", "badge", "fade",
+    "edges", "crevices", "up", "down", "hidden",
     "spots", "dots", "stripes", "bands", "zigzag", "checks", "gingham", "veins",
     "patches", "streaks", "scratches", "chips", "pieces", "along",
 )  # fmt: skip
@@ -42,7 +43,8 @@ class Mask:
     """Where a layer lies. kind: one of `KINDS`. share: of the surface, or of the extent for heights and sides. size: of its
     shapes or of its border's noise, as a share of the object. wear: 0 a border as sharp as paint … 1 a ragged one. invert:
     everywhere else. level: threshold of what the mask is made of, once settled; None before. said: the word that asked for
-    it, for people. pieces: rows of the survey's, of kind "pieces"; axis: a direction, of kind "along". soft: how far it thins
+    it, for people. pieces: rows of the survey's, of kind "pieces"; axis: a direction, of kind "along", and the centre of a
+    kind that has one. soft: how far it thins
     out at its border, in units of what it follows; chance has deviation 1. draw: masks of one draw share their chance, as a
     paint's chips and its primer's do; −1: its own. """
 

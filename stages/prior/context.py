@@ -26,7 +26,11 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
         if listed and not (one.region or other.region):
             other.join = one.join  # "crusted with salt and green corrosion"
             one.much, other.much = 0.6 * one.much, 0.6 * other.much
-    phrases = _marked(_checked(_peeled(_painted(phrases))))
+    if len(phrases) > 1 and phrases[0].thing and not phrases[0].says_stuff and phrases[1].join.kind == "with":
+        skin = phrases[1]
+        if skin.substance in SKINS and not skin.region:  # "an orc with green skin"
+            skin.region, skin.where = PARTS["body"], "body"
+    phrases = _grounded(_marked(_checked(_peeled(_painted(phrases)))))
     result: list[Phrase] = []
     for number, phrase in enumerate(phrases):
         before = result[-1] if result else None
@@ -50,6 +54,12 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             if phrase.region:  # "rust showing through white paint at the edges"
                 before.region, before.where, phrase.region, phrase.where = phrase.region, phrase.where, None, ""
             result[-1] = _covering(before, phrase)
+        elif before and phrase.join.kind == "paint" and not (phrase.says_what or phrase.region):  # "with a satin finish"
+            result[0].finish += phrase.finish
+            _add(result[0].weather, phrase.weather)
+        elif before and phrase.join.kind == "paint" and before.region and _finishes(phrase, result[0]):
+            result[0].substance, result[0].colors = phrase.substance or result[0].substance, phrase.colors
+            result[0].finish += phrase.finish  # "with ivory grips and a nickel finish"
         elif before and phrase.join.kind == "paint" and not (before.region or phrase.region) and before.says_what:
             phrase.join, phrase.thing = before.join, phrase.thing or before.thing
             _add(phrase.weather, before.weather)
@@ -61,6 +71,7 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
         elif before and phrase.substance in CLEAR and _glazes(phrase, before):
             before.finish += phrase.finish or ["glossy"]
             before.colors += phrase.colors
+            _add(before.weather, phrase.weather)
         elif before and not phrase.says_what and not phrase.region:  # "bronze, polished"
             whole = result[0] if before.region and phrase.join.kind == "comma" else before  # "a boot with a red sole, worn"
             if any(word in SHOWS for word in phrase.weather):
@@ -71,18 +82,44 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
         elif before and _wears(before, phrase):
             if phrase.coats and not before.coats:  # "a white fence with flaking paint"
                 before.shows = Phrase(substance=before.substance, thing=before.thing)
-            _add(before.weather, phrase.weather or [WEARS[phrase.where]])
+            worn = result[0] if phrase.join.kind == "comma" and before.region and not phrase.coats else before
+            _add(worn.weather, phrase.weather or [WEARS[phrase.where]])  # "..., steel joints, some scratches"
         elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
             _describe(before, phrase)
+        elif len(result) > 1 and _again(result[0], phrase):
+            result[0].finish += phrase.finish
+            _add(result[0].weather, phrase.weather)
         elif after and _heads(phrase, after):
             after.region, after.where, after.join = phrase.region, phrase.where, Join("with")  # "trim: copper"
         elif before and not phrase.says_what and not (phrase.weather or phrase.finish):
             _lend(before, phrase, after, result)
         else:
-            if before and _within(before, phrase):
+            if before and not phrase.within and _within(before, phrase):
                 phrase.within = before
             result.append(phrase)
     return _in_pairs(_laid(result))
+
+
+SKINS = frozenset(["skin", "hide", "scales", "feathers", "fur"])
+"""What is all that one sees of a beast that has it."""
+
+
+def _finishes(phrase: Phrase, whole: Phrase) -> bool:
+    """Whether a finish that is named last is that of a thing of which no stuff is said."""
+    return bool(whole.thing) and not (whole.substance or whole.colors or phrase.region) and phrase.says_what
+
+
+def _again(whole: Phrase, phrase: Phrase) -> bool:
+    """Whether a phrase after a comma only says again what the whole is of: "a red fox with a white chest, fluffy fur"."""
+    made = _made(whole)
+    plain = bool(phrase.substance) and not (phrase.colors or phrase.region or phrase.thing or phrase.part)
+    return plain and phrase.join.kind == "comma" and bool(made) and KNOWN[phrase.substance][0].look == KNOWN[made][0].look
+
+
+def _made(whole: Phrase) -> str:
+    """The stuff of a phrase, or what its thing is usually made of; "" where none is known."""
+    words = OBJECTS[whole.thing].made.split(" ") if whole.thing else []
+    return whole.substance or next((word for word in words if word in KNOWN and word not in COLORS), "")
 
 
 LISTED = ("cover", "partly", "spots", "inlay", "stud", "streak", "edge")
@@ -150,6 +187,8 @@ def _checked(phrases: list[Phrase]) -> list[Phrase]:
     """Checks of cloth are of two colours, named before or after them, white being the other: "gingham, blue and white"."""
     first, *rest = phrases
     if rest and first.thing and not (first.substance or first.where) and rest[0].where in CLOTHS and rest[0].join.kind != "and":
+        if rest[0].within:
+            return phrases  # "a jar with a red gingham lid"
         return [first, *_checked(rest)]  # "an armchair in houndstooth wool, black on ivory"
     if _plaid(first) and not first.region:
         first = replace(first, region=SHAPES["checks"], where="checks")
@@ -181,6 +220,19 @@ def _checked(phrases: list[Phrase]) -> list[Phrase]:
         return phrases
     marks = Phrase(Join("with"), first.substance, first.boards, other, region=first.region, where=first.where)
     return [replace(first, colors=one, region=None, where="", placed=False), marks, *rest]
+
+
+def _grounded(phrases: list[Phrase]) -> list[Phrase]:
+    """Checks of cloth on a part are on white: "a jar with a red gingham lid"."""
+    result: list[Phrase] = []
+    for phrase in phrases:
+        part = phrase.within
+        if part and part.region and phrase.where in CLOTHS and phrase.join.kind != "and":
+            ground = Phrase(phrase.join, phrase.substance, colors=["white"], region=part.region, where=part.where)
+            result.append(ground)
+            phrase = replace(phrase, join=Join("with"), within=ground)
+        result.append(phrase)
+    return result
 
 
 def _hue_alone(phrase: Phrase) -> bool:
@@ -272,7 +324,12 @@ def _within(before: Phrase, phrase: Phrase) -> bool:
     nests = phrase.join.kind in ("cover", "partly", "spots", "inlay", "stripe", "check", "stud")
     nests = nests and (phrase.region is None or phrase.where in SHAPES)
     marks = phrase.join.kind == "with" and phrase.where in SHAPES
+    marks |= phrase.join.kind in ("comma", "and") and phrase.where in STUDS  # "an ebony handle, brass rivets"
     return before.where in PARTS and before.join.kind != "" and phrase.says_what and (nests or marks)
+
+
+STUDS = ("rivets", "studs", "nails", "screws", "bolts", "buttons")
+"""Patterns that hold a part together."""
 
 
 def _covering(before: Phrase, phrase: Phrase) -> Phrase:
@@ -306,7 +363,7 @@ def _glazes(glaze: Phrase, before: Phrase) -> bool:
 
 
 WEARS = {
-    **dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained",
+    **dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained", "cracks": "cracked",
     **dict.fromkeys(("streaks", "drips", "water stains", "rain streaks", "water streaks", "water marks"), "streaky"),
     **dict.fromkeys(("smudges", "smears"), "dirty"),
 }  # fmt: skip
@@ -392,6 +449,16 @@ def _on_ground(phrases: list[Phrase]) -> list[Phrase]:
     return [*laid, *rest]
 
 
+TWO_TONE = ("stripes", "bands", "checks", "zigzag", "gingham")
+"""Kinds of patterns that two colours share between them."""
+
+
+def _shared_between(whole: Phrase, marks: Phrase) -> bool:
+    """Whether two colours of a pattern are all that one sees of a thing of which no colour is said."""
+    two_tone = marks.region is not None and marks.region.kind in TWO_TONE
+    return two_tone and not (whole.colors or whole.region or whole.animal)
+
+
 def _in_pairs(phrases: list[Phrase]) -> list[Phrase]:
     """Colours side by side share what follows: "red and white striped canvas", "white with red and blue stripes"."""
     phrases = _on_ground(phrases)
@@ -407,7 +474,13 @@ def _in_pairs(phrases: list[Phrase]) -> list[Phrase]:
         said = second.substance and (second.colors or same)
         if said and second.where not in PARTS:
             first.substance, first.boards = second.substance, second.boards
-        if number and second.region and second.where in SHAPES:
+        ground = second.within
+        if ground and ground.region and second.join.kind == "and":  # "with a red and white striped awning"
+            first.region, first.where, second.join = ground.region, ground.where, Join("with")
+            ground.substance = first.substance
+        elif number == 1 and second.join.kind == "and" and _shared_between(phrases[0], second):
+            first.region, first.where = Region("all", 1.0), ""  # "a tent with red and white stripes"
+        elif number and second.region and second.where in SHAPES:
             share = second.region.share
             first.region, first.where = second.region._replace(share=min(0.8, 1.3 * share)), second.where
             second.region = second.region._replace(share=0.6 * share)  # the second lies within the first

@@ -1,12 +1,13 @@
 """A recipe in words, for people: what was understood, and where it lies."""
 
+from stages.material.parts import SHAPED
 from stages.material.recipe import Coat, Mask, Recipe
 
 HEADINGS = ("what", "where", "look", "colour", "roughness", "metal")
 
 PLACES = {
     "all": "everywhere", "below": "lowest {}", "above": "highest {}", "front": "foremost {}", "back": "rearmost {}",
-    "left": "left {}",
+    "middle": "middle {}", "sides": "outermost {} on either side", "badge": "middle of the front, {} wide", "left": "left {}",
     "right": "right {}", "fade": "fading in over the upper {}", "up": "{} facing up", "down": "{} facing down",
     "edges": "{} on edges",
     "crevices": "{} in crevices", "hidden": "innermost {}", "spots": "spots, {}", "stripes": "stripes, {}",
@@ -48,8 +49,12 @@ def place(mask: Mask) -> str:
     """Where a mask lies: "lowest 8 % (sole)"."""
     share = f"{1 - mask.share if mask.invert else mask.share:.0%}".replace("%", " %")
     where = PLACES[mask.kind].format(share)
+    if mask.kind == "badge" and mask.share > 1:
+        where = "all of the front"
     if mask.invert:
         where = f"what is left of it, {share}"
+    if mask.level is None and mask.said.split(" ")[-1] in SHAPED:
+        return f"{mask.said}, found by its shape, or {where}"
     return f"{where} ({mask.said})" if mask.said and mask.said not in where else where
 
 

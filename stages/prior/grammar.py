@@ -9,7 +9,7 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from stages.prior.context import PAINTS, understood
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import DETAILS, PARTS, SHAPES, Region
+from stages.prior.places import DETAILS, GATHERS, PARTS, SHAPES, Region
 from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import PAINTED, Join, Token, tokens_of
 
@@ -27,7 +27,7 @@ def split(
         words that are no slips of the pen.
     """
     phrases = [Phrase()]
-    much, within = 1.0, False
+    much, within, article = 1.0, False, ""
     tokens = [
         token if token.kind != "unknown" or matters(token.text) else token._replace(kind="name")
         for token in tokens_of(prompt, explained or {}, real)
@@ -37,7 +37,9 @@ def split(
         if token.kind == "degree":
             much = token.value
             continue
-        if _stands_for_itself(token, now, following) and len(phrases) == 1:
+        article = token.article if now.empty else article
+        alone = len(phrases) == 1 and _stands_for_itself(token, now, following, article)
+        if alone or (article == "a" and _is_painted(token, phrases)):
             token = Token("thing", token.text)
         if token.kind == "weather":
             now.amount[token.text] = much
@@ -56,7 +58,7 @@ def split(
             if _begins(token, now) and not (within and _lacks(token, now)):
                 now = Phrase(Join("paint" if token.text in PAINTED else "with"))
                 phrases.append(now)
-            _take(now, token)
+            _take(now, token, early=len(phrases) < 3)
         elif now.empty:
             now.join = join if len(phrases) > 1 else now.join
         else:
@@ -86,6 +88,9 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
         return Join("half")
     if token.kind != "join":
         return None
+    laid_bare = next((word for stem, word in PEELING.items() if token.text.startswith(stem)), "")
+    if token.value.kind == "show" and laid_bare and now.coats and laid_bare not in now.weather:
+        now.weather.append(laid_bare)  # "white paint chipped to bare steel"
     if token.value.kind == "show" and following.kind in ("comma", "end") and now.says_what:
         now.join = token.value  # "peeling paint, gray wood showing"
         return None
@@ -105,9 +110,23 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
 
 
 
-def _stands_for_itself(token: Token, now: Phrase, following: Token) -> bool:
-    """Whether what may be a part is the thing itself: "a helmet in olive drab"."""
-    return token.kind == "part" and token.text in OBJECTS and not now.says_what and following.text not in (",", ":", "", "and")
+PEELING = {"chipped": "chipped", "peel": "peeling", "flaking": "flaking"}
+"""What words that bare what is beneath begin with, and what they say of the coat."""
+
+
+def _stands_for_itself(token: Token, now: Phrase, following: Token, article: str) -> bool:
+    """Whether what may be a part is the thing itself: "a helmet in olive drab", "a green door with a brass handle"."""
+    bare = not now.says_what or (article == "a" and not (now.substance or now.thing))
+    return token.kind == "part" and token.text in OBJECTS and bare and following.text not in (",", ":", "", "and")
+
+
+def _is_painted(token: Token, phrases: list[Phrase]) -> bool:
+    """Whether what may be a part is what a coat named before is on: "peeling paint on an old wooden door"."""
+    coat, now = phrases[0], phrases[-1]
+    laid = coat.coats or bool(coat.weather) or coat.substance in GATHERS
+    lies = len(phrases) > 1 and now.join.kind in ("on", "over", "peel") and laid
+    own = token.kind == "part" and token.text in OBJECTS and not now.region
+    return lies and own and not any(phrase.thing for phrase in phrases)
 
 
 def _begins(token: Token, now: Phrase) -> bool:
@@ -128,8 +147,8 @@ def _lacks(token: Token, now: Phrase) -> bool:
     return not (now.substance if token.kind == "substance" else any(map(is_hue, now.colors)))
 
 
-def _take(phrase: Phrase, token: Token) -> None:
-    """Put a token where it belongs in a phrase."""
+def _take(phrase: Phrase, token: Token, early: bool) -> None:
+    """Put a token where it belongs in a phrase. Args: early: one of the first two, which may be the thing itself."""
     kind, text = token.kind, token.text
     if kind == "substance":
         _name(phrase, text)
@@ -139,8 +158,15 @@ def _take(phrase: Phrase, token: Token) -> None:
             said.append(text)
     elif kind == "part" and phrase.thing and phrase.join is FIRST:
         return  # "a bicycle frame" is all frame
-    elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.says_what and phrase.join.kind in ("", "and"):
-        return  # "a checkerboard marble plinth", "blue and white gingham cushion"
+    elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.says_what:
+        if early and phrase.join.kind in ("", "and"):
+            return  # "a checkerboard marble plinth", "blue and white gingham cushion"
+        phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "with a red gingham lid"
+    elif kind == "part" and text.startswith("around") and phrase.where in RINGS:
+        region = token.value if token.value.share < BAND or token.value.kind == "middle" else token.value._replace(share=BAND)
+        phrase.region, phrase.where, phrase.placed = region, text, phrase.says_what  # "a gold ring around the top"
+    elif kind == "part" and phrase.says_what and phrase.where in SHAPES:
+        phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "studs around the rim"
     elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
         phrase.thing = text  # "striped cushion"
     elif kind in ("part", "shape") and (phrase.region is None or kind == "part" or text in PAINTS):
@@ -152,6 +178,9 @@ def _take(phrase: Phrase, token: Token) -> None:
     elif kind == "animal":
         phrase.animal = text
 
+
+RINGS, BAND = ("ring", "rings", "band", "bands", "stripe", "stripes", "line", "lines", "strap", "hoop", "hoops"), 0.08
+"""Patterns of which one lies around a place, and its share of the extent."""
 
 ROUGHENED = ("frosted", "matte")
 """Words of finish that are part of a stuff's name."""
@@ -176,6 +205,8 @@ def _name(phrase: Phrase, text: str) -> None:
     elif text in FIGURES and old not in (*GENERIC, *PAINTED):  # "a brass horn", "with an obsidian hide"
         if phrase.join is not FIRST and phrase.region is None:
             phrase.region, phrase.where = (PARTS["body"], "body") if text in COATS else (DETAILS, text)
+    elif old == "painted" and family(text) in ("metal", "wood"):
+        phrase.substance = f"painted {family(text)}"  # "painted yellow metal"
     elif old == "molten":
         phrase.substance = text  # "molten gold"
     elif family(old) == "rust" and family(text) == "metal":

@@ -25,7 +25,7 @@ def ordered(phrases: list[Phrase]) -> Order:
         base += 1
     upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
     first, over = phrases[base], [*reversed(upper), *phrases[base + 1 :]]
-    for step in (_largest, _framed, _of_body, _told_after, _either_side, _bared, _in_its_places):
+    for step in (_largest, _framed, _of_body, _told_after, _either_side, _bared, in_its_places, _smaller_last):
         first, over = step(first, over)
     return first, over
 
@@ -116,7 +116,7 @@ def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
         named = phrase.join.kind == "comma" and bool(phrase.substance) and not phrase.part
         if k and not (over[k - 1].substance in GATHERS or over[k - 1].weather):
             break
-        whole = _covers(phrase) if named or not k else False
+        whole = (_covers(phrase) or _sawn(phrase, thing)) if named or not k else False
         elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
         if elsewhere or not (whole or (not k and _upholsters(phrase, thing))) or (thing.colors and not named):
             continue
@@ -134,6 +134,12 @@ def _covers(phrase: Phrase) -> bool:
     return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
 
 
+def _sawn(phrase: Phrase, thing: Phrase) -> bool:
+    """Whether a thing of wood is of the boards that it has: "a ship with dark oak planks"."""
+    usual = split(OBJECTS[thing.thing].made)[0]
+    return phrase.boards and phrase.join.kind == "with" and bool(usual.substance) and family(usual.substance) == "wood"
+
+
 def _upholsters(phrase: Phrase, thing: Phrase) -> bool:
     """Whether what a thing is upholstered in is all that one sees of it: of an armchair, not of a chair."""
     usual = split(OBJECTS[thing.thing].made)[0]
@@ -144,9 +150,12 @@ def _either_side(first: Phrase, over: list[Phrase]) -> Order:
     """Two that lie above and below each other share the whole: "gold above, oak below"."""
     if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
         over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
-    region, other = (over[0].region if over else None), first.region
-    if region and other and over[0].where in ("above", "below") and {region.kind, other.kind} == {"above", "below"}:
-        over[0] = replace(over[0], region=region._replace(share=1 - other.share))
+    beside = first
+    for number, phrase in enumerate(over):
+        region, other = phrase.region, beside.region
+        if region and other and phrase.where in ("above", "below") and {region.kind, other.kind} == {"above", "below"}:
+            over[number] = replace(phrase, region=region._replace(share=1 - other.share))
+        beside = phrase
     return first, over
 
 
@@ -158,12 +167,30 @@ def _bared(first: Phrase, over: list[Phrase]) -> Order:
             continue
         usual = split(OBJECTS[first.thing].made)[0] if first.thing else Phrase()
         own = first.substance or usual.substance
-        if own and not first.colors and family(shown.substance) == family(own):
+        metal = bool(own) and family(own) in ("metal", "paint")
+        solid = family(shown.substance) in ("metal", "wood", "stone", "plastic", *(["rust"] if metal else []))
+        unsaid = not first.substance and solid and bool(first.thing)  # "a crate, white paint chipped to aluminium"
+        if own and not first.colors and (unsaid or family(shown.substance) == family(own)):
             first = replace(first, substance=shown.substance, colors=shown.colors)
     return first, over
 
 
-def _in_its_places(first: Phrase, over: list[Phrase]) -> Order:
-    """Parts of a thing that has them elsewhere than others."""
-    places = PARTS_OF.get(first.thing, {})
+def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
+    """Parts of a thing that has them elsewhere than others. Args: thing: where the first does not name it."""
+    places = PARTS_OF.get(thing or first.thing, {})
     return first, [replace(p, region=places.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
+
+
+def _of_thing(phrase: Phrase) -> bool:
+    """Whether it is a part of the thing that it lies on."""
+    return any(phrase.where.endswith(f" {name}") or phrase.where == name for name in PARTS) and not phrase.within
+
+
+def _smaller_last(first: Phrase, over: list[Phrase]) -> Order:
+    """Of parts on the same side the smaller lies on the larger, whichever is named first: a pommel on its grip."""
+    for kind in ("below", "above", "front", "back", "up"):
+        at = [k for k, p in enumerate(over) if p.region and p.region.kind == kind and _of_thing(p)]
+        by_size = sorted((over[k] for k in at), key=lambda p: -p.region.share if p.region else 0.0)
+        for k, phrase in zip(at, by_size, strict=True):
+            over[k] = phrase
+    return first, over

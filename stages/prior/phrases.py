@@ -50,6 +50,11 @@ class Phrase:
         return bool(self.substance or self.thing or self.animal or self.unknown or any(map(is_hue, self.colors)))
 
     @property
+    def says_stuff(self) -> bool:
+        """Whether it names what a thing is made of, or its colour."""
+        return bool(self.substance or self.animal or self.unknown or any(map(is_hue, self.colors)))
+
+    @property
     def color_only(self) -> bool:
         """Whether all it says of the stuff is its colour."""
         return any(map(is_hue, self.colors)) and not (self.substance or self.thing or self.animal or self.unknown)

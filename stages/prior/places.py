@@ -24,20 +24,38 @@ def _table(*entries: tuple[str, Region]) -> dict[str, Region]:
 
 PARTS = _table(
     ("body, bodies, walls, sides, main body, bodywork, exterior, outside, background, ground, rest, siding, cladding, casing, "
-     "housing, enclosure, chassis, outer shell, fuselage, main part, everything else, remainder", Region("all", 1.0)),
+     "housing, enclosure, chassis, outer shell, plating, armour plating, armor plating, body panels, fuselage, main part, "
+     "everything else, remainder", Region("all", 1.0)),
     ("hull", Region("below", 0.6)),
     ("below the waterline, under the waterline, below the water line", Region("below", 0.4)),
     ("above the waterline, above the water line", Region("above", 0.6)),
     ("lower body", Region("below", 0.5)), ("upper body", Region("above", 0.5)),
-    ("label, sticker, decal, logo, emblem, badge", Region("front", 0.12)),
+    ("label, sticker, decal, screen print", Region("badge", 0.6)),
+    ("lettering, letters, numerals, writing", Region("badge", 0.3)),
+    ("logo, emblem, badge, insignia, crest, coat of arms, lock, padlock, keyhole, latch, boss, shield boss, umbo, hub, "
+     "doorknob, door knob, doorbell, button in the middle, medallion in the middle, belt buckle, dial", Region("badge", 0.2)),
+    ("middle, waist, midsection, centre, center, central part, middle section, middle part", Region("middle", 0.33)),
     ("base, bottom, underside, lower half, lower part, bottom half, lower, lower section", Region("below", 0.5)),
     ("sole, soles, outsole, tread, treads", Region("below", 0.08)),
     ("pedestal, plinth, stand, socle, foundation, foundations, hem, skirting", Region("below", 0.2)),
+    ("exhaust, exhausts, exhaust pipe, exhaust pipes, muffler, tailpipe, chin strap, chinstrap, drawer, drawers, "
+     "skids, tracks, caterpillar tracks, undercarriage, suspension, tank treads", Region("below", 0.25)),
+    ("pommel", Region("below", 0.08)),
+    ("guard, crossguard, cross-guard, cross guard, handguard, hand guard, tsuba, quillons, bolster", Region("below", 0.36)),
+    ("end, one end, far end", Region("above", 0.25)),
+    ("shirt, tunic, torso, vest, jacket, sweater, robe, breastplate, chestplate", Region("middle", 0.4)),
+    ("trousers, pants, jeans, shorts, skirt", Region("below", 0.5)),
+    ("boots, shoes, sneakers, sandals", Region("below", 0.12)),
+    ("arms, arm, wings, wing, hands, gloves, gauntlets, sleeves, fins, armrests, arm rests, side panels",
+     Region("sides", 0.45)),
+    ("stern", Region("back", 0.25)), ("bow, prow, figurehead", Region("front", 0.2)),
+    ("sails, sail, rigging", Region("above", 0.6)),
+    ("deck", Region("up", 0.3)), ("fretboard, fingerboard", Region("above", 0.45)),
     ("foot, feet, legs, leg, paws, hooves, castors, casters, wheels, tyres, tires, stem, stalk", Region("below", 0.3)),
     ("top, upper half, upper part, top half, upper, upper section", Region("above", 0.5)),
     ("roof, roofing, rooftop", Region("above", 0.42)),
-    ("lid, cap, cover, hood, dome, crown, crest, hat, bonnet, lids, stopper, hair, comb, mane, "
-     "ceiling", Region("above", 0.22)),
+    ("lid, cap, cover, hood, dome, crown, hat, bonnet, lids, stopper, hair, comb, mane, beret, hood ornament, turban, "
+     "awning, ceiling", Region("above", 0.22)),
     ("lower third, bottom third, lowest third", Region("below", 0.33)),
     ("lower quarter, bottom quarter", Region("below", 0.25)),
     ("upper third, top third", Region("above", 0.33)), ("upper quarter, top quarter, capital", Region("above", 0.25)),
@@ -48,8 +66,9 @@ PARTS = _table(
     ("seat, cushion, cushions, tabletop, table top, shelf, shelves, upholstery, desktop, countertop", Region("up", 0.3)),
     ("tip, point, spire, finial, tips, horns, antlers, knob", Region("above", 0.1)),
     ("blade, blades, barrel of it", Region("above", 0.7)),
-    ("handle, grip, hilt, haft, pommel, shaft, handles, handlebar, stock", Region("below", 0.3)),
-    ("front, front side, fascia, door, front half, screen, windows, window, windshield, chest plate", Region("front", 0.3)),
+    ("handle, grip, hilt, haft, shaft, handles, handlebar, stock", Region("below", 0.3)),
+    ("front, front side, fascia, door, front half, screen, windows, window, windshield, windscreen, visor, faceplate, "
+     "face plate, grille, grill, panel, panels, chest plate, chest, beard", Region("front", 0.3)),
     ("beak, nose, snout, eyes, nozzle, toe, toes, toe cap, toe caps, toecap, toecaps", Region("front", 0.12)),
     ("back, back side, rear, reverse, back half, tail, backside", Region("back", 0.3)),
     ("left half, left side, left", Region("left", 0.5)), ("right half, right side, right", Region("right", 0.5)),
@@ -57,7 +76,7 @@ PARTS = _table(
     ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "
      "edge trim, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
      "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching, laces, "
-     "shoelaces, scabbard, sheath, clasp, lettering, rivet heads",
+     "shoelaces, scabbard, sheath, clasp, rivet heads",
      Region("edges", 0.1, 0.04, 0.1)),
     ("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams, crevice, "
      "carvings, between the scales, between its scales, between the bricks, between the stones, "
@@ -67,14 +86,36 @@ PARTS = _table(
 )
 """Parts of things that name a region."""
 
-_TABLE = {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat": Region("up", 0.3)}
-_CAR = {
-    "roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3), "hood": Region("front", 0.3),
-}
-PARTS_OF = {
-    **dict.fromkeys(("table", "desk", "bench", "stool", "chair", "nightstand", "dresser", "cabinet", "sideboard"), _TABLE),
-    **dict.fromkeys(("car", "sports car", "race car", "pickup truck", "truck", "van", "bus", "taxi", "tram", "train"), _CAR),
-}
+WORN = frozenset([
+    "chest", "shirt", "tunic", "vest", "jacket", "sweater", "robe", "breastplate", "trousers", "pants", "jeans", "shorts",
+    "skirt", "boots", "shoes", "sneakers", "sandals", "panel", "panels",
+])  # fmt: skip
+"""Parts that are things of their own unless another thing has them: "an orc with brown boots"."""
+
+
+def _of_things(*entries: tuple[str, dict[str, Region]]) -> dict[str, dict[str, Region]]:
+    return {thing.strip(): places for text, places in entries for thing in text.split(",")}
+
+
+_LACES = Region("up", 0.15)
+PARTS_OF = _of_things(
+    ("table, desk, bench, stool, chair, nightstand, dresser, cabinet, sideboard",
+     {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat": Region("up", 0.3)}),
+    ("shield, kite shield, round shield, tower shield, buckler, door, mirror, window, picture frame, playing card, sign, "
+     "road sign, traffic sign, rug", {"rim": Region("edges", 0.12, 0.04), "face": Region("badge", 3.0)}),
+    ("shoe, shoes, sneaker, sneakers, boot, boots, trainers, running shoe, running shoes, hiking boot, hiking boots",
+     {"laces": _LACES, "shoelaces": _LACES}),
+    ("penguin, emperor penguin, king penguin, teddy bear, teddy, owl, robin, snowman, gnome, robot, doll, action figure, "
+     "squirrel, meerkat, kangaroo, hamster, plush toy", {"belly": Region("front", 0.3)}),
+    ("guitar, acoustic guitar, electric guitar, violin, cello, ukulele, banjo, lute",
+     {"top": Region("badge", 3.0), "back": Region("back", 0.3)}),
+    ("lamp, floor lamp, table lamp, desk lamp, street lamp, lamp post",
+     {"stem": Region("below", 0.7), "base": Region("below", 0.15), "shade": Region("above", 0.35)}),
+    ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
+    ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
+     {"roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3),
+      "hood": Region("front", 0.3)}),
+)  # fmt: skip
 """Things whose parts lie elsewhere than those of others."""
 
 SHAPES = _table(
@@ -85,7 +126,8 @@ SHAPES = _table(
          "racing stripes, racing stripe, hazard stripes, warning stripes",
      Region("stripes", 0.5, 0.14)),
     ("pinstripes, pinstripe, pinstriped, thin stripes, narrow stripes, fine stripes", Region("stripes", 0.12, 0.08)),
-    ("bands, band, hoops, rings, ring, straps, strap, belts, belt, banded, horizontal stripes, horizontal bands, banding, sash",
+    ("bands, band, hoops, rings, ring, straps, strap, strips, strip, belts, belt, banded, horizontal stripes, "
+     "horizontal bands, banding, sash",
      Region("bands", 0.3, 0.22)),
     ("spots, spot, spotted, speckles, freckles, flecks, speckled, flecked",
      Region("spots", 0.3, 0.14)),
@@ -104,6 +146,8 @@ SHAPES = _table(
      Region("streaks", 0.2, 0.12, 0.8, 0.25)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
     ("sprinkles, confetti", Region("spots", 0.25, 0.05)),
+    ("lights, leds, led lights, indicator lights", Region("spots", 0.05, 0.06)),
+    ("seeds, pips, specks", Region("spots", 0.1, 0.06)),
     ("rainbow, rainbow stripes, rainbow striped, rainbow bands", Region("bands", 0.9, 0.2)),
     ("veins, veining, veined, filigree, inlay, inlays, inlaid, cracks, lines, kintsugi, "
      "lightning", Region("veins", 0.06, 0.22)),
@@ -122,6 +166,9 @@ ANIMALS = {
     "panda": ("#ece8e0", "#161514", Region("patches", 0.4, 0.4, 0.1)),
     "ladybird": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
     "ladybug": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
+    "desert camouflage": ("#b89a70", "#8a6a48 #d6c29a #6e5a40", Region("patches", 0.4, 0.2, 0.2)),
+    "snow camouflage": ("#dfe2e2", "#a4aaae #f2f3f3 #6e7478", Region("patches", 0.4, 0.2, 0.2)),
+    "urban camouflage": ("#8c9094", "#55595d #b8bcc0 #2a2c2e", Region("patches", 0.4, 0.2, 0.2)),
     "camouflage": ("#5a5c3a", "#3a3324 #8c7c54 #1b1a16", Region("patches", 0.4, 0.2, 0.2)),
     "camo": ("#5a5c3a", "#3a3324 #8c7c54 #1b1a16", Region("patches", 0.4, 0.2, 0.2)),
 }
@@ -138,6 +185,8 @@ GATHERS = {
     "ash": Region("up", 0.45, 0.2, 1.0, 0.12),
     "soot": Region("patches", 0.4, 0.3, 1.0, 0.5), "dust": Region("up", 0.5, 0.2, 1.0, 0.2),
     "sand": Region("up", 0.4, 0.2, 1.0, 0.08),
+    "flour": Region("up", 0.4, 0.12, 1.0, 0.15), "limescale": Region("streaks", 0.25, 0.14, 0.9, 0.2),
+    "bird droppings": Region("up", 0.1, 0.12, 0.9),
     "ivy": Region("patches", 0.5, 0.2, 0.8), "leaves": Region("patches", 0.5, 0.12, 0.8),
     "algae": Region("below", 0.4, 0.15, 1.0),
     "icing": Region("above", 0.45, 0.1, 0.6), "frosting": Region("above", 0.45, 0.1, 0.6),
@@ -151,7 +200,10 @@ GATHERS = {
 """What gathers of itself, and where it does when nobody says."""
 
 ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt",
-        "earth": "dirt",         "green patina": "verdigris", "copper patina": "verdigris", "oxidized copper": "verdigris"}
+        "earth": "dirt", "dried mud": "mud", "cracked mud": "mud", "dried blood": "blood", "powdered sugar": "icing sugar",
+        "hard water stains": "limescale", "calcium deposits": "limescale", "droppings": "bird droppings",
+        "guano": "bird droppings",
+        "green patina": "verdigris", "copper patina": "verdigris", "oxidized copper": "verdigris"}
 """Other names of what gathers."""
 
 LAYERED = {"moss": 3e-3, "snow": 8e-3, "rust": 2e-4, "grass": 5e-3}
@@ -186,8 +238,10 @@ WEATHER = _weather(
     ("worn, battered, battle-worn, distressed, used, well-worn, worn-out", Weather("", Region("edges", 0.1, 0.06, 1.0), -1e-4)),
     ("chipped, peeling, flaking, flaky, flaked, peeled", Weather("", Region("chips", 0.2, 0.08, 0.9), -2e-4)),
     ("cracked, crazed, fissured, fractured, cracking", Weather("grime", Region("veins", 0.04, 0.2, 0.3), -2e-4, 0.85)),
+    ("crackled, craquelure, crackle", Weather("grime", Region("veins", 0.05, 0.07, 0.2), -2e-5, 0.7)),
     ("scratched, scuffed, scraped", Weather("", Region("scratches", 0.05, 0.1, 0.9), -5e-5)),
     ("mossy, overgrown", Weather("moss", Region("crevices", 0.42, 0.18, 1.0), 3e-3)),
+    ("marbled", Weather("", Region("patches", 0.4, 0.2, 0.4, 0.1))),
     ("moldy, mouldy, mildewed", Weather("mildew", Region("patches", 0.35, 0.14, 1.0), 0.0, 0.85)),
     ("bloody, bloodstained, blood-stained", Weather("blood", Region("patches", 0.25, 0.18, 0.9))),
     ("dusty, sandy", Weather("dust", Region("up", 0.5, 0.2, 1.0, 0.2), 5e-5, 0.75)),
@@ -224,7 +278,7 @@ DETAILS = Region("edges", 0.1, 0.04, 0.1)
 SHELLED = frozenset(["ladybird", "ladybug"])
 """Animals of `ANIMALS` that have no fur."""
 
-PRINTED = frozenset(["camouflage", "camo"])
+PRINTED = frozenset(name for name in ANIMALS if name.endswith(("camouflage", "camo")))
 """Those that are printed on cloth."""
 
 COVERED = Region("patches", 0.75, 0.3, 0.6)

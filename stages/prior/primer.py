@@ -13,6 +13,9 @@ OXIDE, CHALK = (0.44, 0.23, 0.18), (0.72, 0.70, 0.65)
 WORN = ("chips", "edges")
 """Masks of where paint comes off."""
 
+TRIM = 0.5
+"""Wear up to which an edge is trimmed with something, not worn."""
+
 SEEN = 1.5
 """Of how much more the paint has come off than the primer."""
 
@@ -21,7 +24,7 @@ def primed(base: Coat, layers: list[Layer]) -> list[Layer]:
     """The layers, from below, with a primer wherever paint chips: its chips are the paint's, but smaller."""
     found: list[Layer] = []
     for layer in layers:
-        chips = next((mask for mask in layer.masks if mask.kind in WORN), None)
+        chips = next((mask for mask in layer.masks if mask.kind in WORN and mask.wear > TRIM), None)
         if chips:
             paint, ground = (layer.coat, base) if chips.invert else (base, layer.coat)
             if paint.look in PAINTS and ground.look not in (*PAINTS, "rust"):  # rust creeps under paint and primer alike

@@ -21,7 +21,7 @@ from stages.prior.colors import CHANGES, COLORS, LEANINGS, TREATMENTS, changed, 
 from stages.prior.grammar import split
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
-from stages.prior.order import ROOFING, ordered
+from stages.prior.order import ROOFING, in_its_places, ordered
 from stages.prior.phrases import Phrase, is_hue
 from stages.prior.places import (
     ANIMALS,
@@ -49,7 +49,7 @@ from stages.prior.places import (
 )  # fmt: skip
 from stages.prior.primer import primed
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
-from stages.prior.stuffs import BOARDS, FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
+from stages.prior.stuffs import BOARDS, FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, PAINTABLE, Stuff, boards_of, look_of, stuff
 from stages.prior.text import Vocabulary
 
 RGB = tuple[float, float, float]
@@ -125,12 +125,16 @@ class Reading:
         for those of which words say what they are. Args: said: regions of which words speak."""
         made = split(OBJECTS[base.thing].made) if base.thing and not (base.substance or base.unknown or base.animal) else []
         if len(made) > 1 and not base.colors:
-            inner, over = ordered(made)
+            inner, over = in_its_places(*ordered(made), base.thing)
             inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
             coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
             parts = [layer for part in over if part.region not in said for layer in self._over(part, coat, inner)]
             return [Layer(coat), *parts, *self._weather(inner)]
         coat = self._coat(base)
+        if base.animal in PRINTED and not base.finish and (coat.roughness or 0.0) < MATT:
+            coat = replace(coat, roughness=MATT)
+        if base.animal and (coat.metallic or 0.0) > 0.5:
+            coat = replace(self._of(stuff("paint", False), base), roughness=coat.roughness)  # marks are painted on metal
         layers = [Layer(coat)]
         if base.animal:
             ground, marks, region = ANIMALS[base.animal]
@@ -189,7 +193,7 @@ class Reading:
     def _whole_region(self, phrase: Phrase) -> Region:
         gathers = GATHERS.get(ONCE.get(phrase.substance, phrase.substance))
         if gathers and phrase.where in ("on top", "on the top", "on top of it"):
-            return Region("up", 0.45, gathers.size, gathers.wear)
+            return Region("up", min(0.45, gathers.share) if gathers.kind == "up" else 0.45, gathers.size, gathers.wear)
         if phrase.region:
             return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region
         if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):
@@ -233,6 +237,8 @@ class Reading:
             if inner.substance == "painted metal" and any(word in FINISHES_METAL for word in inner.finish):
                 inner.substance = "paint"
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
+        if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
+            return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
         if phrase.colors and phrase.where.split(" ")[-1] in SOFT:
             return self._of(stuff("fabric", True), phrase)
         if beneath is not None and phrase.colors:  # of the same stuff
@@ -255,6 +261,10 @@ class Reading:
 
     def _of(self, wanted: Stuff, phrase: Phrase, name: str = "") -> Coat:
         """A stuff as a phrase wants it. Args: name: what people call it, in place of the table's."""
+        if wanted.family == "wood" and SILVERED & set(phrase.weather) and not any(map(is_hue, phrase.colors)):
+            grey = KNOWN["weathered wood"][0]
+            color = _triple((1 - SILVER) * np.array(wanted.color) + SILVER * np.array(grey.color))
+            wanted = wanted._replace(look=grey.look, color=color, roughness=max(wanted.roughness, grey.roughness))
         wanted = boards_of(wanted) if phrase.boards else wanted
         roughness = _roughness(phrase, bool(wanted.metallic)) or wanted.roughness
         for word in phrase.weather:
@@ -420,7 +430,8 @@ def _greenish(phrase: Phrase) -> bool:
     return green > 1.15 * red and green > 0.85 * blue
 
 
-SOFT = ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching")
+SOFT = ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
+        "sails")
 """Parts that are of cloth where words name their colour alone."""
 
 DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "silver", "brass", "bronze", "copper", "chrome"])
@@ -445,6 +456,13 @@ def _once(layers: list[Layer]) -> list[Layer]:
 
 BURNT = frozenset(["charred", "burnt", "burned"])
 """Words that say of wood that it is charcoal."""
+
+
+MATT = 0.65
+"""Least roughness of what is camouflaged."""
+
+SILVERED, SILVER = frozenset(["weathered", "sun-bleached"]), 0.6
+"""Words that say of bare wood that sun and rain have turned it grey, and how far."""
 
 
 def _corroded(name: str, phrase: Phrase) -> str:
@@ -483,7 +501,7 @@ def _color(phrase: Phrase, own: RGB | None = None) -> RGB:
 
 def _described(wanted: Stuff, named: RGB) -> RGB:
     """A named colour as this stuff has it: "green moss" is moss."""
-    if wanted.paintable or wanted.metallic:
+    if wanted.paintable or wanted.metallic or wanted.look in PAINTABLE:
         return named
     own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
     if float(np.linalg.norm(own - other)) > SIMILAR or np.hypot(*other[1:]) < GREYISH / 2 < np.hypot(*own[1:]) / 2:
@@ -520,7 +538,8 @@ def _worn(coat: Coat) -> Coat:
 
 def _faded(color: np.ndarray, phrase: Phrase) -> RGB:
     keep = float(np.prod([FADED.get(word, 1.0) for word in phrase.weather]))
-    return _triple(np.mean(color) + keep * (np.asarray(color) - np.mean(color)))
+    pale = np.mean(color) + keep * (np.asarray(color) - np.mean(color))
+    return _triple(pale + 0.5 * (1 - keep) * (1 - pale))
 
 
 def _encoded(lab: np.ndarray) -> RGB:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS, LIKENED
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS, rows, words
-from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET, Region
+from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET, WORN, Region
 from stages.prior.sizes import TIMES
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF
 
@@ -32,7 +32,8 @@ FILLER = words(
     "tint, hue, tone, sheen, shine, glow, glowing, like, more, ware, grain, look, looking, effect, imitation, tones, shade of, "
     "shades of, unpainted, untreated, unvarnished, uncoated, bare, raw, plain, solid, pure, real, genuine, only, just, "
     "whatsoever, at all, should, should be, would, could, to be, i, d, id, want, please, make, give, left out, left outside, "
-    "hand-thrown, whole, overall, throughout, somehow, found, recovered, within, "
+    "hand-thrown, hand painted, handpainted, hand painted style, whole, overall, throughout, somehow, found, recovered, "
+    "within, "
     "from within, still, freshly, fresh, cluster of, hand-painted, "
     "handmade, hand-made, handcrafted, hand-carved, carved, stylized, stylised, low poly, lowpoly, high poly, "
     "cartoon, game asset, game ready, game-ready, game engine, unreal engine, unity, octane render, octane, blender, "
@@ -43,6 +44,10 @@ FILLER = words(
     "baroque, tileable, seamless, tiling, texture variation, roughness variation, color variation, variation, award winning, "
     "professional, elegant, close up, close-up, macro, hd, uhd, dslr, raw photo, hdr, upright, woven, stitched, crushed, "
     "crumpled, dented in, ripped, torn, frayed, "
+    "product shot, studio shot, game prop, movie prop, hard surface, luxury packaging, bluetooth, wireless, fluffy, "
+    "wildlife photography, product photography, food photography, macro photography, "
+    "photography, sharp focus, morning light, soft morning light, golden hour, dramatic lighting, volumetric lighting, "
+    "rim lighting, soft light, creeping, climbing, crawling, trailing, hanging, "
     "wrinkled, down the sides, down the side, down the walls, down its sides, down, slats, slat"
 )
 """Words that say nothing of a material."""
@@ -162,6 +167,10 @@ POSTFIX = {
 }  # fmt: skip
 """Words after what lies on the thing that follows ("moss-covered stone"), and how it does."""
 
+ASIDE = words("near, beside, beside the, next to, next to the, behind, behind the, in front of, in front of the, "
+              "close to, close to the, by the")
+"""Words before a thing that only says where another is: "rust streaks beside the tap"."""
+
 PAINTED = ("painted", "lacquer", "enamel", "whitewash", "gilded")
 """What is said of a stuff after its name: "iron painted black"."""
 
@@ -182,10 +191,10 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     """Each known phrase, the longest first, and each word that none knows. Args: real: words that are no slips of the pen."""
     prompt = re.sub(r"\s[-–—]+\s|[–—]", " , ", prompt)  # "rust - a ship"
     plain = unicodedata.normalize("NFKD", prompt.lower()).encode("ascii", "ignore").decode()
-    plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
     plain = plain.replace("'s ", " ")
     for simile, meant in SIMILES:
         plain = re.sub(simile, meant, plain)
+    plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
     heard = re.findall(r"#[0-9a-f]{6}\b|[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
     found: list[Token] = []
     at, article = 0, ""
@@ -210,7 +219,7 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
             found.append(token._replace(article=article))
         article = ARTICLES.get(heard[at], "")
         at += length
-    return _resolved(_indoors(_dyed(_denied(found))))
+    return _resolved(_indoors(_aside(_dyed(_denied(found)))))
 
 
 ARTICLES = {"a": "a", "an": "a", "the": "the"}
@@ -219,7 +228,14 @@ NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on )"
 SIMILES = (
     (r"\bas (?!well|soon|long|much|many|far)([a-z]+(?:-[a-z]+)?) as " + NOUNS, r"\1"),  # "as black as a raven's wing"
     (r"\b(?:in )?(?:the )?colou?r of " + NOUNS, r"\1 coloured"),  # "the colour of honey"
-    (r"\bwith (?:an? |the )?([a-z -]+?) (?:finish|coating|paint job|paintwork|surface|texture|look)\b", r"finished in \1"),
+    (r"\b(?:with|in|and) (?:an? |the )?((?:(?!(?:with|and|or) )[a-z-]+ ){0,3}?[a-z-]+) "
+     r"(?:finish|coating|paint job|paintwork|surface|texture|look)\b", r"finished in \1"),
+    (r"\b(?:an? )?(?:crackled?|cracked|crazed|craquelure) (?:glaze|glazing)\b", "glaze crackled"),
+    (r",\s*(?:on |against )?(?:an? )?(?:plain |clean )?(?:white|black|gr[ea]y|dark|neutral|transparent|plain|clean|studio) "
+     r"background\b", ","),
+    (r"\bpowder coated\b(?! in| with)", "powder-coated"),
+    (r"\b([a-z]+) and ([a-z]+) marbled\b", r"\1 and \2 swirled"),
+    (r"\b(?:8|number eight)[ -]?ball\b", "eight ball"),
 )
 """What says in a roundabout way what an adjective says."""
 
@@ -232,6 +248,24 @@ def _dyed(found: list[Token]) -> list[Token]:
             kept.append(token)
         elif kept and (kept[-1].kind == "substance" or kept[-1].text in LIKENED):
             kept[-1] = Token("color", kept[-1].text)
+    return kept
+
+
+OVER_OR_UNDER = ("under", "beneath", "below", "underneath", "above")
+
+
+def _aside(found: list[Token]) -> list[Token]:
+    """What is left without what something only is beside, or "under the tap"."""
+    kept: list[Token] = []
+    aside = False
+    for token, after in zip(found, [*found[1:], Token("end", "")], strict=False):
+        thing = after.kind == "thing" and after.article == "the" and any(t.kind == "thing" for t in kept)
+        if (token.kind == "aside" and after.kind != "part") or (token.text in OVER_OR_UNDER and thing):
+            aside = True
+        elif token.kind in ("join", "comma", "postfix", "half"):
+            aside = False
+        if not aside:
+            kept.append(token)
     return kept
 
 
@@ -369,7 +403,8 @@ def singulars(word: str) -> list[str]:
     return [word.removesuffix(end) + instead for end, instead in endings if word.endswith(end) and len(word) > len(end) + 2]
 
 
-PLACED = words("on, on the, at, at the, to the, in the, around, around the, along, along the, on its, in its, over the, "
+PLACED = words("near, near the, near its, towards the, toward the, on, on the, at, at the, to the, in the, around, "
+               "around the, along, along the, on its, in its, over the, "
                "inside the")
 """What may stand before a part to say that something lies there."""
 
@@ -399,6 +434,8 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("thing", token.text)  # "an orange"
         elif token.kind == "thing" and token.text in KNOWN and (not names or _stands_before(ahead, behind)):
             token = Token("substance", token.text)
+        elif token.kind == "part" and token.text in WORN & OBJECTS.keys() and not any(t.kind == "thing" for t in result):
+            token = Token("thing", token.text)  # "faded jeans"
         elif token.kind == "thing" and token.text in PARTS and (result or ahead):
             token = Token("part", token.text, PARTS[token.text])
         result.append(token)
@@ -469,6 +506,8 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("part", {f"{word} {place}": PARTS[place] for word in PLACED for place in PARTS} | {"on top of it": PARTS["top"]})
     enter("filler", [f"{word} {place}" for word in ("from the", "from its", "down from the") for place in PARTS])
     enter("part", {f"up to {the}{place}": Region("below", 0.45) for the in ("", "the ", "its ") for place in PARTS})
+    enter("part", {f"up from {the}{place}": Region("below", 0.45) for the in ("", "the ", "its ") for place in PARTS})
+    enter("aside", ASIDE)
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
     for known, *others in rows("spellings.tsv"):
         table |= {other: table[known] for other in words(others[0]) if other not in table}

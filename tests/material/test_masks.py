@@ -107,3 +107,38 @@ def test_chevrons_turn_back_on_themselves() -> None:
     assert abs(whole.mean() - 0.5) < 0.02
     assert abs(whole - whole[:, ::-1]).mean() < 0.02  # a mirror image of itself
     assert abs(whole - np.roll(whole, 32, 1)).mean() > 0.2  # and not of straight bands
+
+
+def cube(size: int) -> Surface:
+    """Points on the six sides of a cube of edge 1 about the origin, size² each."""
+    across = (np.arange(size) + 0.5) / size - 0.5
+    u, v = (a.ravel() for a in np.meshgrid(across, across))
+    sides = [(axis, sign) for axis in range(3) for sign in (-0.5, 0.5)]
+    point = np.concatenate([np.insert(np.stack([u, v], 1), axis, sign, 1) for axis, sign in sides]).astype(np.float32)
+    normal = np.concatenate([np.broadcast_to(2 * sign * np.eye(3)[axis], (len(u), 3)) for axis, sign in sides])
+    return Surface.bare(point, normal.astype(np.float32), 1 / size)
+
+
+def on_cube(mask: Mask, size: int = 64) -> tuple[Surface, np.ndarray]:
+    """A cube, and whether a mask settled on it covers each of its points."""
+    surface = cube(size)
+    layer = settled(Recipe(Coat("even"), (Layer(Coat("even"), (mask,)),), 3), surface).layers[0]
+    place = Place(surface.point.T.copy(), surface.point.T[:2].copy(), np.zeros(len(surface), np.int32), surface.footprint)
+    return surface, coverage(layer.masks, surface, place) > 0.5
+
+
+def test_a_badge_lies_in_the_middle_of_the_front_and_nowhere_else() -> None:
+    surface, covered_ = on_cube(Mask("badge", 0.3, 0.05, 0.0))
+    front = surface.normal[:, 0] > 0.5
+    assert not covered_[~front].any()
+    assert (abs(surface.point[covered_, 1:]) < 0.15 + 1 / 64).all()
+    assert 0.8 * 0.3**2 < covered_[front].mean() < 0.3**2  # a square with round corners
+    surface, covered_ = on_cube(Mask("badge", 3.0, 0.05, 0.0))
+    assert (covered_ == (surface.normal[:, 0] > 0.5)).mean() > 0.99  # all of the front
+
+
+def test_a_waist_and_arms_are_where_words_say() -> None:
+    surface, waist = on_cube(Mask("middle", 0.25, 0.05, 0.0))
+    assert (waist == (abs(surface.point[:, 2]) < 0.125)).mean() > 0.99
+    surface, arms = on_cube(Mask("sides", 0.5, 0.05, 0.0))
+    assert (arms == (abs(surface.point[:, 1]) > 0.25)).mean() > 0.99

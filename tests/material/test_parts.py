@@ -105,3 +105,22 @@ def test_what_the_shape_does_not_show_lies_where_words_put_it() -> None:
         assert found(Mask("below", 0.3, said=word), crate) is None
     assert covered(crate, "handle").mean() == pytest.approx((crate.point[:, 2] < -0.2).mean(), abs=0.02)
     assert found(Mask("below", 0.3, said="handle"), Surface.bare(crate.point[:50], crate.normal[:50], 1e-3)) is None
+
+
+def test_a_guard_lies_between_blade_and_handle_and_a_pommel_at_its_end() -> None:
+    sword = surface(*SWORD)
+    z = sword.point[:, 2]
+    guard, handle, pommel = (covered(sword, word) > 0.5 for word in ("guard", "handle", "pommel"))
+    shown = guard & ~handle  # the handle lies over it
+    assert (shown & (z > -0.31) & (z < -0.2)).sum() > 0.8 * shown.sum() > 0
+    assert shown[(abs(sword.point[:, 1]) > 0.05)].mean() > 0.5  # the guard itself
+    assert pommel.any() and (z[pommel] < -0.42).all() and not (pommel & ~handle).any()
+
+
+@pytest.mark.parametrize("lies", [False, True])
+def test_one_end_is_a_quarter_of_a_long_thing(lies: bool) -> None:
+    beam = box((-0.05, -0.05, -0.5), (0.05, 0.05, 0.5))
+    beam = (beam[0][:, [2, 1, 0]], beam[1][:, [2, 1, 0]]) if lies else beam
+    end = surface(beam)
+    along = end.point[:, 0 if lies else 2]
+    assert ((covered(end, "end") > 0.5) == (along > 0.25)).mean() > 0.99

@@ -119,6 +119,42 @@ def test_what_lies_on_a_part_lies_nowhere_else(read) -> None:  # type: ignore[no
 
 
 @pytest.mark.parametrize(
+    ("prompt", "kinds"),
+    [("a glass jar with a red gingham lid", [["above"], ["above", "gingham"]]),
+     ("a mahogany knife with an ebony handle, brass rivets", [["below"], ["below", "spots"]]),
+     ("a walnut drum with bronze studs around the rim", [["above", "spots"]]),
+     ("an oak table with a gold ring around the top", [["above"]]),
+     ("a shop of brick with a red and white striped awning", [["above"], ["above", "stripes"]])],
+)  # fmt: skip
+def test_a_pattern_on_a_part_stays_on_it(read, prompt: str, kinds: list[list[str]]) -> None:  # type: ignore[no-untyped-def]
+    assert [[mask.kind for mask in layer.masks] for layer in read(prompt).layers] == kinds
+
+
+def test_two_colours_of_a_pattern_leave_nothing_of_what_is_beneath(read) -> None:  # type: ignore[no-untyped-def]
+    base, marks = read("a circus tent with red and white stripes").coats
+    assert base.look == marks.look == "canvas"
+    assert base.color == read("red canvas").base.color and marks.color == read("white canvas").base.color
+    painted = read("a white mug with red and blue stripes")
+    assert painted.base.color == read("a white mug").base.color and len(painted.layers) == 2
+
+
+@pytest.mark.parametrize(
+    ("prompt", "base"),
+    [("a revolver with ivory grips and a nickel finish", "steel"), ("a walnut sideboard with a satin finish", "walnut"),
+     ("peeling blue paint on an old wooden door", "oak"), ("a red fox, fluffy fur", "fur"),
+     ("a crate with white paint chipped to bare aluminium", "aluminium"), ("a Bluetooth speaker wrapped in linen", "linen")],
+)  # fmt: skip
+def test_what_the_whole_is_made_of_is_found(read, prompt: str, base: str) -> None:  # type: ignore[no-untyped-def]
+    assert read(prompt).base.look == base
+
+
+def test_what_is_smaller_lies_on_what_is_larger(read) -> None:  # type: ignore[no-untyped-def]
+    one, other = (read(f"a steel sword with {parts}") for parts in ("a brass pommel and an oak grip",
+    "an oak grip and a brass pommel"))
+    assert [coat.look for coat in one.coats] == [coat.look for coat in other.coats] == ["steel", "oak", "brass"]
+
+
+@pytest.mark.parametrize(
     ("prompt", "look"),
     [("corroded copper", "verdigris"), ("corroded iron pipe", "rust"), ("oxidized silver ring", "soil")],
 )
