@@ -20,6 +20,7 @@ from stages.asset.report_mesh import page_mesh
 from stages.asset.report_view import PageLight, box, groups, light_data, packed
 from stages.asset.webp import encode_webp
 from stages.core.artifact import sha256_file, write_text
+from stages.core.parallel import in_parallel
 
 PICTURE_SIZE, FEW = 1024, 4
 """Longest edge of a map in the page, pixels, of so many texture sets; of more, all together have as many."""
@@ -159,14 +160,13 @@ def maps_of(look: Look, size: int) -> Maps:
     """Each map of a look, at most so many texels wide."""
     orm = look.packed()
     albedo = eight_bit(look.pictures["albedo"].pixels())[..., :3]
-    pixels = {"albedo": albedo}
-    pixels |= {"roughness": np.repeat(orm[..., 1:2], 3, 2), "metallic": np.repeat(orm[..., 2:3], 3, 2)}
+    pixels = {"albedo": albedo, "roughness": orm[..., 1:2], "metallic": orm[..., 2:3]}
     if "occlusion" in look.pictures:
-        pixels["occlusion"] = np.repeat(orm[..., 0:1], 3, 2)
+        pixels["occlusion"] = orm[..., 0:1]
     if "normal" in look.pictures:
         pixels["normal"] = eight_bit(look.pictures["normal"].pixels())[..., :3]
-    uris = {name: image(small(values, size), QUALITY.get(name, DATA_QUALITY)) for name, values in pixels.items()}
-    return Maps(uris, albedo.shape[1])
+    uris = in_parallel(lambda name: image(rgb(small(pixels[name], size)), QUALITY.get(name, DATA_QUALITY)), pixels)
+    return Maps(dict(zip(pixels, uris, strict=True)), albedo.shape[1])
 
 
 def small(pixels: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
@@ -174,6 +174,11 @@ def small(pixels: NDArray[np.uint8], size: int) -> NDArray[np.uint8]:
     height, width = pixels.shape[:2]
     share = min(1.0, size / max(height, width))
     return resized(pixels, max(1, round(width * share)), max(1, round(height * share)))
+
+
+def rgb(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(H, W, 3) of (H, W, 1) or (H, W, 3)."""
+    return np.repeat(pixels, 3, 2) if pixels.shape[2] == 1 else pixels
 
 
 def image(pixels: NDArray[np.uint8], quality: int) -> str:

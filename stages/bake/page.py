@@ -9,16 +9,18 @@ import numpy as np
 from stages.asset.report_page import Page, PageView, Shot, write_page
 from stages.asset.report_view import PageLight
 from stages.bake.checks import Facts, checks
-from stages.bake.preview import Look, draw_view
+from stages.bake.preview import Look, draw_views
 from stages.bake.studio import BACKDROP, EXPOSURE, FOV_Y, GROUND, VIEWS, backdrop, camera
 from stages.core.artifact import Artifact, Provenance
 from stages.core.color import srgb_encode
+from stages.core.parallel import in_parallel
 from stages.core.progress import Progress
 from stages.core.texture_sets import TextureSet
 from stages.light.environment import Environment, directions_of_texels
 from stages.light.lights import BUILTIN, direction, disc, gradient, panel, preview_light
 from stages.light.prefilter import cosine_harmonics, mip_levels, split_lamp
 from stages.light.scene import Scene
+from stages.light.transport import cached_light_set
 
 LIGHT_ROWS = 128
 """Of the lights that are made here."""
@@ -26,7 +28,7 @@ LIGHT_ROWS = 128
 SUSPECTS = 2
 """Lights of distillation, the first ones, whose trace is looked for in the albedo."""
 
-SHOT_VIEWS = ((35.0, 16.0), (205.0, 24.0))
+SHOT_VIEWS = {"front": (35.0, 16.0), "back": (205.0, 24.0)}
 """Azimuth and elevation of the pictures, degrees."""
 
 PACKAGES = ("dreammat", "numpy", "torch", "embreex", "xatlas", "OpenImageIO")
@@ -103,14 +105,15 @@ def extent(sets: list[TextureSet]) -> str:
 
 def pictures(look: Look, size: int) -> list[Shot]:
     """The asset from two sides under lights that nothing was trained on; the view in 3-D has a third one, preview.png's."""
-    shots = []
     used = look.scene.vertices[np.unique(look.scene.triangles)].astype(np.float64)
-    for light in (dusk(), softbox()):
-        for azimuth, elevation in SHOT_VIEWS:
-            picture = draw_view(look, light, camera(used, azimuth, elevation), size)
-            caption = f"{light.name.capitalize()}, {'front' if azimuth < 90 else 'back'}"
-            shots.append(Shot(caption, srgb_encode(picture.over(backdrop(size)))))
-    return shots
+    lights, places = (dusk(), softbox()), [camera(used, *view) for view in SHOT_VIEWS.values()]
+    cached_light_set(lights)  # once, not in every thread
+    sides = in_parallel(lambda c2w: draw_views(look, lights, c2w, size), places)
+    return [
+        Shot(f"{light.name.capitalize()}, {name}", srgb_encode(picture.over(backdrop(size))))
+        for light, pictures in zip(lights, zip(*sides, strict=True), strict=True)
+        for name, picture in zip(SHOT_VIEWS, pictures, strict=True)
+    ]
 
 
 @functools.cache

@@ -7,6 +7,7 @@ rougher by as much. The light is the project's own transport under an environmen
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -148,10 +149,15 @@ class Look:
 
 
 def draw_view(look: Look, light: Environment, c2w: NDArray, size: int) -> Picture:
-    """One view."""
+    """One view under one light."""
+    return draw_views(look, [light], c2w, size)[0]
+
+
+def draw_views(look: Look, lights: Sequence[Environment], c2w: NDArray, size: int) -> list[Picture]:
+    """One view under each light: all are lit by the same rays."""
     across = 2 * size
     directions = camera_rays(c2w, FOV_Y, across, across)[1].reshape(across, across, 3)
-    alpha, color, material = (np.zeros((across, across, k), np.float32) for k in (1, 3, 5))
+    alpha, material, colors = (np.zeros((across, across, k), np.float32) for k in (1, 5, 3 * len(lights)))
     for top in range(0, across, TILE):
         for left in range(0, across, TILE):
             wide = [slice(max(first - MARGIN, 0), first + TILE + MARGIN) for first in (top, left)]
@@ -159,10 +165,11 @@ def draw_view(look: Look, light: Environment, c2w: NDArray, size: int) -> Pictur
             kept = tuple(
                 slice(first - part.start, first - part.start + TILE) for first, part in zip((top, left), wide, strict=True)
             )
-            drawn = _draw(look, light, directions[wide[0], wide[1]], c2w, 2 * np.tan(FOV_Y / 2) / across)
-            for whole, part in zip((alpha, color, material), drawn, strict=True):
+            drawn = _draw(look, lights, directions[wide[0], wide[1]], c2w, 2 * np.tan(FOV_Y / 2) / across)
+            for whole, part in zip((alpha, material, colors), drawn, strict=True):
                 whole[inner] = part[kept]
-    return Picture(alpha[..., 0] > 0, color, material, covered(look.scene, alpha, c2w))
+    share = covered(look.scene, alpha, c2w)
+    return [Picture(alpha[..., 0] > 0, color, material, share) for color in np.split(colors, len(lights), 2)]
 
 
 def covered(scene: Scene, alpha: NDArray[np.float32], c2w: NDArray) -> NDArray[np.float32]:
@@ -185,22 +192,24 @@ def covered(scene: Scene, alpha: NDArray[np.float32], c2w: NDArray) -> NDArray[n
     return share
 
 
-def _draw(look: Look, light: Environment, directions: NDArray, c2w: NDArray, step: float) -> tuple[NDArray, NDArray, NDArray]:
-    """Alpha (h, w, 1), colour and material of a tile. Args: directions: (h, w, 3)."""
+def _draw(
+    look: Look, lights: Sequence[Environment], directions: NDArray, c2w: NDArray, step: float
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Alpha (h, w, 1), material, and the colour under each light (h, w, 3 lights) of a tile. Args: directions: (h, w, 3)."""
     shape, rays = directions.shape[:2], directions.reshape(-1, 3)
     hits = look.scene.intersect(np.broadcast_to(c2w[:3, 3], rays.shape), rays)
     mask = hits.mask.reshape(shape)
-    alpha, color, material = (np.zeros((*shape, k), np.float32) for k in (1, 3, 5))
+    alpha, material, colors = (np.zeros((*shape, k), np.float32) for k in (1, 5, 3 * len(lights)))
     if mask.any():
         points, across, spread = look.points(hits, rays, mask, c2w, step)
         values = look.material(points, across)
         alpha[mask], material[mask] = 1, values
         values[:, 3] = rougher(values[:, 3], spread)
-        color[mask] = reflected(look.scene, points, [light], values, RAYS, seed=0)[0]
+        radiance = reflected(look.scene, points, list(lights), values, RAYS, seed=0)  # (lights, P, 3)
         if look.scene.emission is not None:
-            color[mask] += look.scene.emission.at(points.triangle, points.barycentric, across)
-        color *= np.float32(EXPOSURE)
-    return alpha, color, material
+            radiance += look.scene.emission.at(points.triangle, points.barycentric, across)
+        colors[mask] = np.concatenate(np.float32(EXPOSURE) * radiance, 1)
+    return alpha, material, colors
 
 
 def footprint(scene: Scene, points: GBuffer, directions: NDArray, c2w: NDArray, step: float) -> NDArray[np.float32]:

@@ -35,7 +35,7 @@ class Surface:
         """The points picked by a mask of the same shape, in row-major order."""
         return Surface(self.triangle[mask], self.barycentric[mask])
 
-    def __getitem__(self, index: NDArray) -> "Surface":
+    def __getitem__(self, index: NDArray | slice) -> "Surface":
         return Surface(self.triangle[index], self.barycentric[index])
 
     def interpolate(self, corners: NDArray[np.float32]) -> NDArray[np.float32]:

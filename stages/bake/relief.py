@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.bake.raster import Layout, Surface
-from stages.core.parallel import compiled
+from stages.core.parallel import compiled, in_parallel, slices
 from stages.light.normal_maps import NormalMaps, frame
 from stages.material.relief import gentle
 
@@ -20,6 +20,10 @@ FAR = 4.0
 
 FLAT = 1e-3
 """Least spread of a texel's neighbours across, against along, for a gradient in both directions."""
+
+
+TOGETHER = 1 << 15
+"""Texels that lean together: the whole of a map would take a hundred times its bytes."""
 
 
 def relief_normals(
@@ -47,11 +51,14 @@ def relief_normals(
     _slopes(height, surface.triangle, surface.barycentric, charts, layout.uv, positions, steps, slope)
     result = np.zeros((*height.shape, 3), np.float32)
     result[..., 2] = 1
-    for row in range(len(height)):  # one row at a time: the whole of it would take a hundred times the map's bytes
-        on = surface.triangle[row] >= 0
+
+    def lean(rows: slice) -> None:
+        on = surface.triangle[rows] >= 0
         if on.any():
-            points = Surface(surface.triangle[row], surface.barycentric[row]).where(on)
-            result[row, on] = _lean(points, slope[row, on], carry, normals, frames, own)
+            points = surface[rows].where(on)
+            result[rows][on] = _lean(points, slope[rows][on], carry, normals, frames, own)
+
+    in_parallel(lean, slices(len(height), max(1, TOGETHER // len(height))))
     return result
 
 

@@ -13,6 +13,10 @@ from stages.core.errors import InputError
 TEXT_HEIGHT = 14
 """Of names in pictures, pixels."""
 
+AVERAGE = 0x40
+"""libpng's filter of all rows: each pixel less the mean of its left and upper neighbours. To try all filters on every row takes
+twice the time, and saves 0 to 2 % of the bytes of textures."""
+
 
 def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
     """Write a PNG atomically, of 8 bits, or of 16 where the pixels have them.
@@ -32,6 +36,7 @@ def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
         spec = oiio.ImageSpec(width, height, count, pixels.dtype.name)
         spec["oiio:UnassociatedAlpha"] = 1
         spec["png:compressionLevel"] = compression
+        spec["png:filter"] = AVERAGE
         written = output.open(str(temporary), spec)
         written = written and output.write_image(pixels) and output.close()
         if not written:

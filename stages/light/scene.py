@@ -132,7 +132,12 @@ class Scene:
 
     def geometric_normal(self, triangle: NDArray) -> NDArray[np.float32]:
         """Unit normal of each triangle, by its winding. Args: (P,). Returns: (P, 3); zero for a degenerate one."""
-        a, b, c = (self.vertices[self.triangles[triangle, k]].astype(np.float64) for k in range(3))
+        return self._flat_normals[triangle]
+
+    @functools.cached_property
+    def _flat_normals(self) -> NDArray[np.float32]:
+        """(F, 3): there are more points that ask than triangles."""
+        a, b, c = (self.vertices[self.triangles[:, k]].astype(np.float64) for k in range(3))
         normal = np.cross(b - a, c - a)
         length = np.linalg.norm(normal, axis=-1, keepdims=True)
         return (normal / np.where(length > 0, length, 1)).astype(np.float32)
