@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from stages.asset.report_page import Page, PageView, Shot, write_page
+from stages.asset.report_page import Page, PageView, Shot
 from stages.asset.report_view import PageLight
 from stages.bake.checks import Facts, checks
 from stages.bake.preview import Look, draw_views
@@ -14,7 +14,6 @@ from stages.bake.studio import BACKDROP, EXPOSURE, FOV_Y, GROUND, VIEWS, backdro
 from stages.core.artifact import Artifact, Provenance
 from stages.core.color import srgb_encode
 from stages.core.parallel import in_parallel
-from stages.core.progress import Progress
 from stages.core.texture_sets import TextureSet
 from stages.light.environment import Environment, directions_of_texels
 from stages.light.lights import BUILTIN, direction, disc, gradient, panel, preview_light
@@ -64,22 +63,16 @@ def softbox() -> Environment:
     return Environment("softbox", light.astype(np.float32))
 
 
-def report_page(
-    out: Path, mesh: Artifact, made: Provenance, look: Look, facts: list[Facts],
-    files: list[str], size: int, progress: Progress,
-) -> str:  # fmt: skip
-    """Write report.html.
+def page_of(mesh: Artifact, made: Provenance, look: Look, facts: list[Facts], size: int) -> Page:
+    """What report.html says and shows.
 
     Args:
         made: what bake.json says. look: the mesh as it is shown. facts: of each texture set. size: pixels of a picture.
-    Returns:
-        the file's name.
     """
-    progress("report", 0, 1)
     said = made.extra
     source = str(said["source_name"])
     lights, sets = suspects(tuple(said["environments"])), [TextureSet.from_json(of) for of in said["sets"]]
-    page = Page(
+    return Page(
         name=Path(source).stem,
         prompt=str(said["prompt"] or ""),
         meta=f"{source}, {len(mesh['triangles']):,} triangles, {extent(sets)}",
@@ -90,9 +83,6 @@ def report_page(
         light=page_light(),
         view=first_view(look.scene),
     )
-    write_page(out / "report.html", page, files)
-    progress("report", 1, 1)
-    return "report.html"
 
 
 def extent(sets: list[TextureSet]) -> str:

@@ -22,7 +22,6 @@ from stages.core.color import srgb_encode
 from stages.core.frames import camera_rays
 from stages.core.images import labelled
 from stages.core.parallel import in_parallel
-from stages.core.progress import Progress
 from stages.core.texture_sets import triangle_sets
 from stages.core.tiles import repeats
 from stages.light.environment import Environment
@@ -76,7 +75,7 @@ class Picture:
         return mean * self.covered + (1 - self.covered) * background
 
 
-def contact_sheet(look: "Look", size: int, progress: Progress) -> NDArray[np.float32]:
+def contact_sheet(look: "Look", size: int) -> NDArray[np.float32]:
     """Draw the preview.
 
     Args:
@@ -85,13 +84,11 @@ def contact_sheet(look: "Look", size: int, progress: Progress) -> NDArray[np.flo
         (rows, columns, 3) encoded sRGB in [0, 1].
     """
     light, scene = preview_light(), look.scene
-    progress("preview", 0, 1)
     cached_light_set((light,))  # once, not in every thread
     drawn = in_parallel(lambda c2w: draw_view(look, light, c2w, size), cameras(scene.vertices, scene.triangles))
     cells = [srgb_encode(picture.over(backdrop(size))) for picture in drawn]
     named = "albedo.png" if len(look.maps) == 1 else "albedo of each set"
     cells += [*material_cells(drawn[0]), labelled(atlases(look, size), named)]
-    progress("preview", 1, 1)
     return np.concatenate([np.concatenate(cells[k : k + COLUMNS], 1) for k in range(0, len(cells), COLUMNS)], 0)
 
 

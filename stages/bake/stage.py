@@ -20,15 +20,16 @@ from stages.asset.maps import Maps
 from stages.asset.model import source_model
 from stages.asset.parts import labels
 from stages.asset.passed_on import PassedOn
+from stages.asset.report_page import write_page
 from stages.asset.textures import write_textures
 from stages.asset.traced import baked_bumps, traced_scene, triangle_parts, world_frames
 from stages.asset.wavefront import write_obj
 from stages.bake.checks import Facts, islands
 from stages.bake.evaluate import evaluate
-from stages.bake.fill import fill_unseen, pad
+from stages.bake.fill import Nearest, fill_groups
 from stages.bake.occlusion import occlusion_map
 from stages.bake.options import BakeOptions
-from stages.bake.page import report_page
+from stages.bake.page import page_of
 from stages.bake.preview import Look, contact_sheet
 from stages.bake.raster import Layout, Surface, joined, touched_texels
 from stages.bake.relief import relief_normals
@@ -53,6 +54,7 @@ from stages.core.artifact import (
 )
 from stages.core.errors import ArtifactError, OutputError
 from stages.core.images import write_png
+from stages.core.parallel import beside
 from stages.core.progress import Progress, silent
 from stages.core.schemas import ASSET, MATERIAL, PREP
 from stages.core.texture_sets import ONE_SET, TextureSet, texture_sets, triangle_sets
@@ -111,6 +113,14 @@ class Subject:
     def corners(self) -> NDArray[np.float32]:
         """World positions of the triangles' corners, (F, 3, 3)."""
         return self.mesh["vertices"][self.mesh["triangles"]]
+
+    def pad(self, *maps: NDArray[np.float32]) -> None:
+        """Give every texel off the charts the values of the nearest texel on one, in place; see `Nearest`."""
+        self._nearest.pad(*maps)
+
+    @cached_property
+    def _nearest(self) -> Nearest:
+        return Nearest.of(self.touched.triangle >= 0)
 
 
 def subjects(prep: Path, mesh: Artifact, sets: list[TextureSet]) -> Iterator[Subject]:
@@ -218,18 +228,17 @@ def bake_maps(
 ) -> tuple[Maps, Covered]:
     """The material of every texel of a set, to the last one."""
     on_chart = subject.touched.triangle >= 0
-    mesh = subject.mesh
+    mesh, charts, rays = subject.mesh, subject.mesh["charts"], options.occlusion_rays
     texels = Texels(learnt, subject.corners, mesh["normals"], subject.label, subject.layout, subject.touched)
-    residual = texels.residual()
-    groups = patches(subject.touched, mesh["charts"])
-    unseen = mend_unseen(subject, groups, views_of(made), learnt, residual, progress)
-    maps = texels.recipe(options.supersample, groups, progress)
-    values = combined(*(torch.from_numpy(a[on_chart]) for a in (maps[..., :5], residual)))
+    groups = patches(subject.touched, charts)
+    with beside(lambda: learnt_of(subject, groups, views_of(made), learnt, texels)) as known:
+        maps = texels.recipe(options.supersample, groups, progress)
+        occlusion = occlusion_map(subject.scene, subject.touched, charts, rays, subject.open, progress)
+    residual, unseen = known.result()
+    values = combined(*(torch.from_numpy(a) for a in (maps[on_chart][:, :5], residual)))
     maps[on_chart, :5] = values.numpy()
-    charts, rays = mesh["charts"], options.occlusion_rays
-    occlusion = occlusion_map(subject.scene, subject.touched, charts, rays, subject.open, progress)
     progress("padding", 0, 1)
-    pad(on_chart, maps, occlusion)
+    subject.pad(maps, occlusion)
     height = bounded(maps[..., 5], options.relief) if learnt.recipe.has_relief and options.relief else None
     covered = Covered(on_chart.size, int(on_chart.sum()), unseen)
     return Maps(np.ascontiguousarray(maps[..., :5]), height, occlusion=occlusion), covered
@@ -244,7 +253,7 @@ def with_normals(subject: Subject, maps: Maps) -> Maps:
     normals = relief_normals(
         maps.height, touched, subject.layout, mesh["charts"], (subject.corners, mesh["normals"]), frames, subject.scene.bumps
     )  # fmt: skip
-    pad(touched.triangle >= 0, normals)
+    subject.pad(normals)
     return replace(maps, normal=normals)
 
 
@@ -267,10 +276,11 @@ class Shown:
 def write_set(out: Path, subject: Subject, maps: Maps, progress: Progress) -> Shown:
     """Write the maps of a texture set."""
     progress("files", 0, 1)
-    files = write_textures(out, maps, subject.mesh.provenance.extra["source_format"] == "obj", subject.set)
-    facts = Facts.of(maps.material, subject.touched, islands(subject.mesh, subject.triangles), subject.set.share)
+    mesh, part = subject.mesh, subject.set.share
+    with beside(lambda: Facts.of(maps.material, subject.touched, islands(mesh, subject.triangles), part)) as facts:
+        files = write_textures(out, maps, mesh.provenance.extra["source_format"] == "obj", subject.set)
     normal = None if maps.normal is None else means(maps.normal, subject.block)
-    return Shown(subject.set, files, means(maps.material, subject.block), normal, maps.occlusion is not None, facts)
+    return Shown(subject.set, files, means(maps.material, subject.block), normal, maps.occlusion is not None, facts.result())
 
 
 def shown_look(subject: Subject, shown: list[Shown]) -> Look:
@@ -281,36 +291,35 @@ def shown_look(subject: Subject, shown: list[Shown]) -> Look:
     return Look.of(subject.mesh, scene, [of.material for of in shown])
 
 
-def mend_unseen(
-    subject: Subject, groups: Patches, views: Views, learnt: LearntMaterial, residual: NDArray[np.float32], progress: Progress
-) -> int:
-    """Fill, in place, what was learnt at texels that no view saw from seen surface nearby; all stay when none was seen.
+def learnt_of(
+    subject: Subject, groups: Patches, views: Views, learnt: LearntMaterial, texels: Texels
+) -> tuple[NDArray[np.float32], int]:
+    """What was learnt at the texels on charts, where no view saw them that of seen surface nearby, if any was seen.
 
     What other texture sets show is nearby too.
 
     Args:
-        groups: the texels, by which sight is decided. residual: (H, W, 5) of the texels.
+        groups: the texels, by which sight is decided.
     Returns:
-        how many texels on charts no view saw.
+        (N, 5) logits, row by row; how many of these texels no view saw.
     """
-    progress("visibility", 0, 1)
-    on_chart = subject.touched.triangle >= 0
-    surface = subject.touched.where(on_chart)
+    values = texels.residual()
+    surface = subject.touched.where(subject.touched.triangle >= 0)
     first = surface[groups.first]
     seen = seen_points(subject.scene, first, views, subject.open)
     if subject.mesh.provenance.extra["shared_texels"]:
         seen |= seen_elsewhere(subject.scene, subject.layout, subject.mesh["charts"], groups, views, subject.open)
     texel_seen = seen[groups.of_texel]
     if seen.all():
-        return 0
-    progress("filling", 0, 1)
-    values, others = residual[on_chart], seen_of_others(subject, views)
+        return values, 0
+    others = seen_of_others(subject, views)
     known = subject.points(joined([first[seen], others]))
     of_known = np.concatenate([groups.mean(values)[seen], evaluate(learnt.residual, others.interpolate(subject.corners))])
     if len(of_known):
-        values[~texel_seen] = fill_unseen(known, of_known, subject.points(surface[~texel_seen]))
-        residual[on_chart] = values
-    return int((~texel_seen).sum())
+        hidden = np.flatnonzero(~texel_seen)
+        _, nearby, group = np.unique(groups.of_texel[hidden], return_index=True, return_inverse=True)
+        values[hidden] = fill_groups(known, of_known, subject.points(surface[hidden]), nearby, group)
+    return values, int((~texel_seen).sum())
 
 
 def seen_of_others(subject: Subject, views: Views) -> Surface:
@@ -344,11 +353,16 @@ def write_asset(
         the files' names, textures too; what bake.json says, with what the models could not hold.
     """
     prep, subject = of
-    size = int(made.options["preview_size"])
-    files, look, notes = write_models(out, subject, shown, size, progress)
+    size, look = int(made.options["preview_size"]), shown_look(subject, shown)
+    progress("preview", 0, 1)
+    with beside(lambda: page_of(subject.mesh, made, look, [one.facts for one in shown], size)) as page:
+        files, notes = write_models(out, subject, shown, look, size)
     files += [keep_mesh(out, prep), *kept]
+    progress("report", 0, 1)
+    write_page(out / "report.html", page.result(), files)
+    progress("report", 1, 1)
+    files.append("report.html")
     made = replace(made, extra={**made.extra, **notes})
-    files.append(report_page(out, subject.mesh, made, look, [one.facts for one in shown], files, size, progress))
     write_manifest(out, ASSET, made, files)
     return files, made.extra
 
@@ -366,17 +380,18 @@ def keep_mesh(out: Path, prep: Path) -> str:
 
 
 def write_models(
-    out: Path, subject: Subject, shown: list[Shown], preview_size: int, progress: Progress
-) -> tuple[list[str], Look, dict[str, int]]:
+    out: Path, subject: Subject, shown: list[Shown], look: Look, preview_size: int
+) -> tuple[list[str], dict[str, int]]:
     """Write models and preview of texture sets that are written.
 
+    Args:
+        look: what the preview shows.
     Returns:
-        the files' names, textures too; what the preview shows; what the models could not hold.
+        the files' names, textures too; what the models could not hold.
     """
     mesh, relief = subject.mesh, shown[0].normal is not None
     files = [name for of in shown for name in of.files]
-    look, passed_on = shown_look(subject, shown), PassedOn.of(mesh)
-    passed_on = passed_on.without("normalTexture") if relief else passed_on
+    passed_on = PassedOn.of(mesh).without("normalTexture") if relief else PassedOn.of(mesh)
     names = {part["material"] for part in mesh.provenance.extra["parts"]}
     model = source_model(mesh, subject.open, names if relief else set(passed_on.normal_maps()))
     pictures = [pictures_of(out, of, wrap) for of, wrap in zip(shown, look.wraps, strict=True)]
@@ -385,8 +400,8 @@ def write_models(
     if mesh.provenance.extra["source_format"] == "obj":
         write_obj(out / "model.obj", mesh, relief)
         files += ["model.obj", "model.mtl"]
-    write_png(out / "preview.png", contact_sheet(look, preview_size, progress))
-    return [*files, "preview.png", *write_studio(out, mesh, preview_size)], look, model.notes
+    write_png(out / "preview.png", contact_sheet(look, preview_size))
+    return [*files, "preview.png", *write_studio(out, mesh, preview_size)], model.notes
 
 
 def pictures_of(folder: Path, shown: Shown, wrap: int) -> gltf.Pictures:

@@ -16,7 +16,6 @@ from stages.core.progress import Progress
 from stages.material import surface as material_surface
 from stages.material.evaluate import COLUMNS, evaluate
 from stages.material.learnt import LearntMaterial
-from stages.material.residual import OUTPUTS
 from stages.material.uneven import uneven
 
 TASKS = 8
@@ -47,11 +46,9 @@ class Texels:
         self._piece[shown] = made.lookup.surface(centre, mean, self._texel[shown]).piece
 
     def residual(self) -> NDArray[np.float32]:
-        """What was learnt at every texel that a chart touches: (size, size, 5) logits, 0 off the charts."""
-        on_chart = self._touched.triangle >= 0
-        values = np.zeros((*on_chart.shape, OUTPUTS), np.float32)
-        values[on_chart] = evaluate_residual(self._made.residual, self._touched.where(on_chart).interpolate(self._corners))
-        return values
+        """What was learnt at every texel that a chart touches, row by row: (N, 5) logits."""
+        points = self._touched.where(self._touched.triangle >= 0).interpolate(self._corners)
+        return evaluate_residual(self._made.residual, points)
 
     def recipe(self, supersample: int, groups: Patches, progress: Progress) -> NDArray[np.float32]:
         """The recipe's material of every texel that a chart touches: (size, size, 6), see `COLUMNS`; 0 off the charts.

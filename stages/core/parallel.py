@@ -5,12 +5,13 @@ that depends on timing, the same bytes on any number of cores. A thread without 
 (OpenMP's, which torch uses) gain little for one job and take the cores from all others.
 """
 
+import contextlib
 import functools
 import math
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -98,6 +99,23 @@ def ahead(make: Callable[[int], Result], numbers: range) -> Iterator[Result]:
             if i != numbers[-1]:
                 coming.append(pool.submit(make, i + numbers.step))
             yield found
+
+
+@contextlib.contextmanager
+def beside(function: Callable[[], Result]) -> Iterator[Future[Result]]:
+    """Call a function on another thread while the block runs, and before it where there is but one core; done at its end.
+
+    Yields: what it returns, once asked for.
+    """
+    made: Future[Result] = Future()
+    if cores() < 2 or getattr(_thread, "working", False):
+        made.set_result(function())
+        yield made
+        return
+    with ThreadPoolExecutor(1, initializer=_begin) as pool:
+        made = pool.submit(function)
+        yield made
+    made.result()
 
 
 def slices(count: int, size: int) -> list[slice]:

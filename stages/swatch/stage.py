@@ -11,7 +11,7 @@ from stages.asset.maps import Maps
 from stages.asset.textures import PNG_LEVEL, to_8bit, write_textures
 from stages.core.artifact import Provenance, Schema, peek, plain_options, read_manifest, run_log, write_manifest
 from stages.core.images import write_png
-from stages.core.parallel import cores
+from stages.core.parallel import beside, cores
 from stages.core.progress import Progress, silent
 from stages.material.directions import WHOLE
 from stages.material.library import Library, hashes
@@ -59,12 +59,11 @@ def make_swatch(out: Path, options: SwatchOptions, force: bool = False, progress
         recipe = flat(read)
         progress("maps", 0, 1)
         maps = tile(recipe, options.size)
-        progress("files", 0, 1)
-        out.mkdir(parents=True, exist_ok=True)
-        files = [*write_textures(out, maps, grey=True), "height.png", "preview.png"]
-        write_png(out / "height.png", height_8bit(maps), PNG_LEVEL)
         progress("preview", 0, 1)
-        write_png(out / "preview.png", preview(maps, options.preview_size))
+        with beside(lambda: write_maps(out, maps)) as written:
+            sheet = preview(maps, options.preview_size)
+        write_png(out / "preview.png", sheet)
+        files = [*written.result(), "preview.png"]
         progress("preview", 1, 1)
         rows = [dict(zip(HEADINGS, row, strict=True)) for row in explained(recipe)]
         report = {"prompt": options.prompt, "understood": rows, "metres": recipe.base.metres, "recipe": recipe.to_json()}
@@ -99,6 +98,13 @@ def tile_normals(height: NDArray[np.float32]) -> NDArray[np.float32]:
     right, up = np.moveaxis(gentle(np.stack([right, up], -1)), -1, 0)
     normal = np.stack([-right, -up, np.ones_like(height)], -1)
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
+def write_maps(out: Path, maps: Maps) -> list[str]:
+    """Write the maps into a folder. Returns: the files' names."""
+    out.mkdir(parents=True, exist_ok=True)
+    write_png(out / "height.png", height_8bit(maps), PNG_LEVEL)
+    return ["height.png", *write_textures(out, maps, grey=True)]
 
 
 def height_8bit(maps: Maps) -> NDArray[np.uint8]:

@@ -33,9 +33,8 @@ FAST = PrepOptions(texture_size=256, padding=2, unwrap_triangles=0)
 SMALL = BakeOptions(size=512, preview_size=32, occlusion_rays=4)
 
 
-def blank(out: Path, *args: object) -> str:
-    (out / "report.html").write_text("")
-    return "report.html"
+def blank(page: Path, *args: object) -> None:
+    page.write_text("")
 
 
 @contextmanager
@@ -43,7 +42,8 @@ def no_pictures() -> Iterator[None]:
     """Assets without preview and report, which these tests do not look at."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("stages.bake.stage.contact_sheet", lambda *args: np.zeros((4, 4, 3), np.float32))
-        patched.setattr("stages.bake.stage.report_page", blank)
+        patched.setattr("stages.bake.stage.page_of", lambda *args: None)
+        patched.setattr("stages.bake.stage.write_page", blank)
         yield
 
 

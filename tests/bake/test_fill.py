@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from stages.bake.fill import fill_unseen, pad
+from stages.bake.fill import fill_groups, fill_unseen, pad
 from stages.bake.raster import Layout, touched_texels
 from stages.bake.visibility import Views, is_open, patches, seen_points
 from stages.core.frames import look_at
@@ -57,6 +57,20 @@ def test_unseen_points_on_a_seen_one_take_its_value() -> None:
     normal = np.array([[0, 0, 1], [0, 0, 1]], "f4")
     filled = fill_unseen((position, normal), np.array([[1.0], [2.0]], "f4"), (position, normal))
     np.testing.assert_allclose(filled, [[1], [2]], atol=1e-6)
+
+
+def test_groups_are_filled_as_their_points_alone_are() -> None:
+    """A finely seen sphere and groups of four points each, a hundredth apart, of which one searches for all."""
+    rng = np.random.default_rng(0)
+    normal = rng.normal(size=(4000, 3)).astype("f4")
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    values = (normal @ rng.normal(size=(3, 5))).astype("f4")
+    seen, facing = (0.4 * normal, normal), normal[:200].repeat(4, 0)
+    wanted = (0.42 * facing + rng.uniform(-0.005, 0.005, facing.shape)).astype("f4")
+    exact = fill_unseen(seen, values, (wanted, facing))
+    alone, group = np.arange(800), np.arange(200).repeat(4)
+    np.testing.assert_allclose(fill_groups(seen, values, (wanted, facing), alone, alone), exact, atol=1e-5)
+    np.testing.assert_allclose(fill_groups(seen, values, (wanted, facing), 4 * np.arange(200), group), exact, atol=1e-5)
 
 
 def seen_of(example, cameras: Views, size: int = 64):  # type: ignore[no-untyped-def]

@@ -49,13 +49,13 @@ def assets(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for name, example in (("sets", divided()), ("one", cube().with_(source_format="obj"))):
             prep = save_prep(folder / f"{name}.npz", example)
             bake(prep, save_material(folder / f"{name}_material.npz", prep, small_residual()), folder / name, SMALL)
-            patch.setattr(stage, "report_page", blank)  # nobody reads the other's
+            patch.setattr(stage, "page_of", lambda *args: None)
+            patch.setattr(stage, "write_page", blank)  # nobody reads the other's
     return folder
 
 
-def blank(out: Path, *args: object) -> str:
-    (out / "report.html").write_text("")
-    return "report.html"
+def blank(page: Path, *args: object) -> None:
+    page.write_text("")
 
 
 def test_each_set_has_its_files_and_the_manifest_lists_them(assets: Path) -> None:

@@ -39,12 +39,12 @@ MATERIAL = (0.6, 0.3, 0.05, 0.35, 0.8)
 def no_preview(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests that look at other files: a blank preview and an empty report."""
 
-    def blank(out: Path, *args: object) -> str:
-        (out / "report.html").write_text("")
-        return "report.html"
+    def blank(page: Path, *args: object) -> None:
+        page.write_text("")
 
     monkeypatch.setattr(stage, "contact_sheet", lambda *args: np.zeros((4, 4, 3), np.float32))
-    monkeypatch.setattr(stage, "report_page", blank)
+    monkeypatch.setattr(stage, "page_of", lambda *args: None)
+    monkeypatch.setattr(stage, "write_page", blank)
 
 
 TEXTURES = {"albedo.exr", "roughness.exr", "metallic.exr", "occlusion.exr", "albedo.png", "orm.png"}

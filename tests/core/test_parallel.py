@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from stages.core import parallel
-from stages.core.parallel import ahead, compiled, in_parallel, quota, slices
+from stages.core.parallel import ahead, beside, compiled, in_parallel, quota, slices
 
 
 def write(path: Path, text: str) -> None:
@@ -95,6 +95,24 @@ def test_a_task_that_starts_tasks_does_them_itself(threads: int) -> None:
 def test_an_error_in_a_task_comes_out(threads: int) -> None:
     with pytest.raises(ZeroDivisionError):
         in_parallel(lambda i: 1 // i, [1, 0, 2])
+
+
+def test_beside_runs_while_the_block_does_where_there_are_cores(threads: int) -> None:
+    entered = threading.Event()
+
+    def makes() -> tuple[bool, set[str]]:
+        nested = in_parallel(lambda _: threading.current_thread().name, range(3))
+        return entered.wait(5.0 if threads > 1 else 0.0), set(nested)
+
+    with beside(makes) as made:
+        entered.set()
+    met, names = made.result()
+    assert met == (threads > 1) and len(names) == 1 if threads > 1 else not met
+
+
+def test_an_error_beside_comes_out_at_the_end_of_the_block(threads: int) -> None:
+    with pytest.raises(ZeroDivisionError), beside(lambda: 1 // 0):
+        pass
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")

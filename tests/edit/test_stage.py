@@ -77,12 +77,12 @@ def test_everything_that_depends_on_an_edit_is_rewritten_and_undo_gives_the_firs
 def no_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests that look at other files: a blank preview and an empty report."""
 
-    def blank(out: Path, *args: object) -> str:
-        (out / "report.html").write_text("")
-        return "report.html"
+    def blank(page: Path, *args: object) -> None:
+        page.write_text("")
 
     monkeypatch.setattr("stages.bake.stage.contact_sheet", lambda *args: np.zeros((4, 4, 3), np.float32))
-    monkeypatch.setattr("stages.bake.stage.report_page", blank)
+    monkeypatch.setattr("stages.bake.stage.page_of", lambda *args: None)
+    monkeypatch.setattr("stages.bake.stage.write_page", blank)
 
 
 @pytest.mark.usefixtures("no_pictures")
