@@ -38,15 +38,15 @@ def understood(options: DistillOptions) -> Any:
     """The recipe that the prompt's words call for, before any mesh is known. Raises: InputError."""
     from stages.core.errors import InputError
     from stages.material.library import Library
-    from stages.prior.model import load_prior
     from stages.prior.prompt import read_parts, read_prompt
+    from stages.prior.vocabulary import ShippedWords
 
     if options.guidance != "prior":
         raise InputError(f"--explain with --guidance {options.guidance}: it reads no words; expected --guidance prior")
     if not options.prompt.strip():
         raise InputError("--explain: no --prompt is given; say what the object is made of")
     library = Library(options.library) if options.library else None
-    prior = load_prior()
+    prior = ShippedWords()
     recipe = read_prompt(options.prompt, prior, options.seed, options.object_size, library)
     return replace(recipe, parts=read_parts(options.parts, recipe, prior, options.seed, library))
 

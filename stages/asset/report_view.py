@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from stages.asset.report_mesh import PageMesh, octahedral, steps
-from stages.core.albedo import MIN_COSINE, diffuse_table, specular_albedo
+from stages.core.albedo import MIN_COSINE, diffuse_table, open_albedo
 from stages.core.tiles import repeats
 
 TABLE = (33, 64)
@@ -106,7 +105,7 @@ def white_albedos() -> NDArray[np.float16]:
     rows, columns = TABLE
     cosine = np.maximum((np.arange(columns) / (columns - 1)) ** 2, MIN_COSINE)
     roughness = np.repeat(np.arange(rows) / (rows - 1), columns)
-    specular = specular_albedo(torch.from_numpy(roughness), torch.from_numpy(np.tile(cosine, rows))).numpy()
+    specular = open_albedo(roughness, np.tile(cosine, rows))
     table = diffuse_table()
     diffuse = np.interp(np.sqrt(cosine), np.arange(len(table)) / (len(table) - 1), table)
     return np.column_stack([specular, np.tile(diffuse, rows), np.ones(rows * columns)]).astype(np.float16)

@@ -7,14 +7,16 @@ roughness relative to it, so that a white furnace comes out exact between knots 
 
 import functools
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from stages.core.brdf import MIN_ALPHA, alpha_from_roughness, directional_albedo
 from stages.core.parallel import in_parallel
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 FILE = Path(__file__).with_name("albedo.npy")
 
@@ -45,15 +47,27 @@ def cosines() -> NDArray[np.float64]:
     return np.maximum((np.arange(COSINE_STEPS) / (COSINE_STEPS - 1)) ** 2, MIN_COSINE)
 
 
-def specular_albedo(roughness: Tensor, cosine: Tensor) -> Tensor:
+def open_albedo(roughness: NDArray, cosine: NDArray) -> NDArray:
     """Albedo of A and B, bilinear in the table.
 
     Args:
-        roughness, cosine: (P,) in [0, 1]; cosine is N·V.
+        roughness, cosine: (P,) in [0, 1], of one float type; cosine is N·V.
     Returns:
-        (P, 2). Differentiable in: roughness.
+        (P, 2).
     """
-    values = torch.from_numpy(table()).to(roughness)
+    values = table().astype(roughness.dtype)
+    y = roughness * (ROUGHNESS_STEPS - 1)
+    x = np.sqrt(cosine.clip(0, 1)) * (COSINE_STEPS - 1)
+    row, column = y.astype(np.int64).clip(0, ROUGHNESS_STEPS - 2), x.astype(np.int64).clip(0, COSINE_STEPS - 2)
+    fy, fx = ((at - cell).astype(values.dtype)[:, None] for at, cell in ((y, row), (x, column)))
+    near = values[row, column] * (1 - fx) + values[row, column + 1] * fx
+    far = values[row + 1, column] * (1 - fx) + values[row + 1, column + 1] * fx
+    return near * (1 - fy) + far * fy
+
+
+def specular_albedo(roughness: "Tensor", cosine: "Tensor") -> "Tensor":
+    """`open_albedo` of tensors, (P, 2). Differentiable in: roughness."""
+    values = roughness.new_tensor(table())
     y = roughness * (ROUGHNESS_STEPS - 1)
     x = cosine.clamp(0, 1).sqrt() * (COSINE_STEPS - 1)
     row, column = y.detach().long().clamp(0, ROUGHNESS_STEPS - 2), x.long().clamp(0, COSINE_STEPS - 2)

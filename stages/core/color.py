@@ -4,28 +4,36 @@ is converted where it is read or written.
 Curves work on NumPy arrays and torch tensors alike, element by element, and keep dtype and device.
 """
 
-from typing import TypeVar
+import importlib
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
-import torch
 from numpy.typing import ArrayLike, NDArray
 
-Array = TypeVar("Array", np.ndarray, torch.Tensor)
+if TYPE_CHECKING:  # takes two seconds, which who has no tensors need not spend
+    import torch
+
+Array = TypeVar("Array", np.ndarray, "torch.Tensor")
 
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 """Rec. 709 luminance weights of linear R, G, B."""
 
 
+def _library_of(values: Any) -> Any:
+    """numpy or torch."""
+    return np if isinstance(values, np.ndarray | np.generic) else importlib.import_module("torch")
+
+
 def srgb_encode(linear: Array) -> Array:
     """Linear [0, 1] to sRGB [0, 1]; the input is clamped. Source: IEC 61966-2-1."""
-    xp = torch if isinstance(linear, torch.Tensor) else np
+    xp = _library_of(linear)
     c = linear.clip(0.0, 1.0)
     return xp.where(c <= 0.0031308, 12.92 * c, 1.055 * c.clip(0.0031308, 1.0) ** (1 / 2.4) - 0.055)
 
 
 def srgb_decode(encoded: Array) -> Array:
     """sRGB [0, 1] to linear [0, 1]; the input is clamped. Source: IEC 61966-2-1."""
-    xp = torch if isinstance(encoded, torch.Tensor) else np
+    xp = _library_of(encoded)
     c = encoded.clip(0.0, 1.0)
     return xp.where(c <= 0.04045, c / 12.92, ((c.clip(0.04045, 1.0) + 0.055) / 1.055) ** 2.4)
 

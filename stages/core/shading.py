@@ -17,19 +17,10 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 from torch import Tensor
 
 from stages.core.albedo import specular_albedo
-
-F0 = 0.04
-"""Normal reflectance of every dielectric: glTF 2.0, index of refraction 1.5."""
-
-KNOTS = (0.0, 0.08, 0.16, 0.25, 0.36, 0.5, 0.65, 0.82, 1.0)
-"""Roughness at which A and B are stored; holds 0, 0.5 and 1."""
-
-LIGHT_MAPS = tuple((m, r) for m in (0, 1) for r in (0.0, 0.5, 1.0))
-"""Metallic and roughness of the six light maps, in the paper's order."""
+from stages.core.knots import F0, KNOTS, LIGHT_MAPS
 
 
 @dataclass(frozen=True)
@@ -226,6 +217,8 @@ def spline_slopes(knots: tuple[float, ...]) -> NDArray[np.float64]:
 
     The third derivative is continuous at the last knots but one ("not a knot").
     """
+    from scipy.interpolate import CubicSpline  # takes half a second, which who does not shade need not spend
+
     x = np.log(np.array(knots) + SOFTEN)
     return CubicSpline(x, np.eye(len(x)))(x, 1)
 

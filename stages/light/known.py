@@ -9,12 +9,11 @@ in afterwards, so that smoothing blurs light and not textures.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from stages.core.albedo import diffuse_table, specular_albedo
+from stages.core.albedo import diffuse_table, open_albedo
 from stages.core.brdf import alpha_from_roughness
-from stages.core.shading import F0, KNOTS
+from stages.core.knots import F0, KNOTS
 from stages.light import reconstruction
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
@@ -51,8 +50,7 @@ class Known(Terms):
 def known(roughness: NDArray[np.float32], cosine: NDArray[np.float32]) -> Known:
     """The sums of points of this roughness and N·V, (P,) each."""
     own = np.maximum(roughness, np.float32(SMOOTHEST))
-    specular = specular_albedo(torch.from_numpy(own), torch.from_numpy(cosine)).numpy()
-    opened = np.concatenate([between_cosines(diffuse_table()[:, None], cosine), specular], 1)
+    opened = np.concatenate([between_cosines(diffuse_table()[:, None], cosine), open_albedo(own, cosine)], 1)
     made = Known(roughness=(0.0,), shares=(0.4, 0.6), stored=5, mirror=(1, 3), judged=(0, 2), sharp=(), highlights=(0,))
     return replace(made, own=own, opened=opened)
 

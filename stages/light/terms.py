@@ -8,12 +8,11 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from stages.core.albedo import COSINE_STEPS, cosines, diffuse_table, specular_albedo
+from stages.core.albedo import COSINE_STEPS, cosines, diffuse_table, open_albedo
 from stages.core.brdf import alpha_from_roughness
-from stages.core.shading import KNOTS, LIGHT_MAPS
+from stages.core.knots import KNOTS, LIGHT_MAPS
 from stages.light import blender
 
 
@@ -68,8 +67,8 @@ class Terms:
         if on:
             found = blender.open_albedo(cosines(), np.array(self.roughness), departure, reflection, 128)
             return found.astype(np.float32)
-        cosine = torch.from_numpy(cosines().astype(np.float32))
-        knots = [specular_albedo(torch.full_like(cosine, roughness), cosine).numpy() for roughness in self.roughness]
+        cosine = cosines().astype(np.float32)
+        knots = [open_albedo(np.full_like(cosine, roughness), cosine) for roughness in self.roughness]
         return np.stack([diffuse_table(), *(k[:, 0] for k in knots), *(k[:, 1] for k in knots)], -1)
 
     def mirror_weights(self, cosine: NDArray[np.float64]) -> tuple[NDArray, NDArray]:

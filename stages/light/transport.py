@@ -32,17 +32,16 @@ Heidrich 2001, "Interleaved Sampling".
 import functools
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from stages.core.albedo import MIN_COSINE
 from stages.core.brdf import alpha_from_roughness
 from stages.core.frames import tangent_frame
+from stages.core.knots import KNOTS
 from stages.core.parallel import cores
-from stages.core.shading import KNOTS, Transport
 from stages.light import highlights, reconstruction
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
@@ -61,6 +60,11 @@ from stages.light.transport_kernels import (
     settle,
     to_trace,
 )
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from stages.core.shading import Transport
 
 TILE = 512
 """Points a thread takes at once: their rays stay in its cache."""
@@ -135,7 +139,7 @@ class Sums:
 
 def light_transport(
     scene: Scene, points: GBuffer, environments: list[Environment], quality: Quality, seed: int
-) -> list[Transport]:
+) -> list["Transport"]:
     """Transport of every point of a view under each environment.
 
     Returns:
@@ -158,16 +162,22 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
     return light_set(list(environments))
 
 
-def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list[Transport]:
+def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list["Transport"]:
     """`light_transport` for lights that are already split."""
     near = reconstruction.Neighbours.of(points)
     sums = gather(scene, points, lights, quality, seed, near).of_lights(len(lights.environments))
     mean = smoothed(sums, points, lights, near) if quality.smooth else sums.mean
+    import torch  # here, for who only asks for what a known material reflects has no tensors
+
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
     return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
 
 
-def _transport(sums: NDArray, cosine: torch.Tensor) -> Transport:
+def _transport(sums: NDArray, cosine: "Tensor") -> "Transport":
+    import torch
+
+    from stages.core.shading import Transport
+
     E, A, B = torch.from_numpy(sums).split([1, len(KNOTS), len(KNOTS)], 1)
     return Transport(E[:, 0], A, B, cosine)
 

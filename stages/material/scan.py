@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from stages.core.color import srgb_decode
 from stages.core.errors import InputError
@@ -260,6 +259,8 @@ def repeats(values: Array) -> bool:
 
 def _normally(values: Array) -> tuple[Array, Array]:
     """Each channel by rank as a normally distributed one, and its sorted values (CHANNELS, M)."""
+    from scipy.special import ndtri  # takes a second with all that it loads, which who has no scans need not spend
+
     flat = values.reshape(-1, CHANNELS)
     count = len(flat)
     normal = np.empty_like(flat)
@@ -271,6 +272,8 @@ def _normally(values: Array) -> tuple[Array, Array]:
 
 def _way_back(quantiles: Array, hidden: float) -> NDArray:
     """(STEPS,) mean value of what is seen as each normal score, where a level lost a part of deviation `hidden`."""
+    from scipy.special import ndtr
+
     at = np.linspace(-SPAN, SPAN, STEPS)
     nodes, weights = np.polynomial.hermite_e.hermegauss(15)
     share = ndtr(at[:, None] + hidden * nodes[None])

@@ -14,16 +14,14 @@ from stages.core.artifact import Field, Provenance, Schema, load_npz, save_npz, 
 from stages.core.errors import ArtifactError
 from stages.prior import profile
 from stages.prior.network import Denoiser
-from stages.prior.text import WEIGHTS_FOLDER, Reader, TextEmbedding, TextEncoder, Vocabulary
+from stages.prior.text import Reader, TextEmbedding, TextEncoder
+from stages.prior.vocabulary import VOCABULARY_FILE, WEIGHTS_FILE, Vocabulary
 
 WEIGHTS = Schema("dreammat.prior", 1, {"parameters": Field("f2", ("N",))}, extra=("layout", "training"))
 """All parameters in one row, in the order of `layout`: [name, shape] each. training: what they came from."""
 
 PRECISION = torch.bfloat16
 """Of the denoiser's products."""
-
-WEIGHTS_FILE = WEIGHTS_FOLDER / "prior.npz"
-VOCABULARY_FILE = WEIGHTS_FOLDER / "vocabulary.npz"
 
 
 class PriorNetwork(nn.Module):

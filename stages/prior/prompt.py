@@ -6,10 +6,9 @@ same tables and explains other words by a dictionary, and look like the substanc
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cache
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from torch import Tensor
 
 from stages.core.color import srgb_decode, srgb_encode
 from stages.material.evaluate import means
@@ -50,7 +49,10 @@ from stages.prior.places import (
 from stages.prior.primer import primed
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
 from stages.prior.stuffs import BOARDS, FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, PAINTABLE, Stuff, boards_of, look_of, stuff
-from stages.prior.text import Vocabulary
+from stages.prior.vocabulary import Vocabulary
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 RGB = tuple[float, float, float]
 
@@ -68,12 +70,12 @@ UNSAID = "plaster"
 
 
 class Words(Protocol):
-    """What knows words: a `Prior`."""
+    """What knows words: a `Prior`, or `ShippedWords`."""
 
     @property
     def vocabulary(self) -> Vocabulary: ...
 
-    def read(self, prompts: list[str]) -> Tensor:
+    def read(self, prompts: list[str]) -> "Tensor":
         """Mean sRGB albedo, roughness and metallic of B prompts, (B, 5)."""
 
 

@@ -9,7 +9,16 @@ from numpy.typing import NDArray
 
 from stages.asset.maps import Maps
 from stages.asset.textures import PNG_LEVEL, to_8bit, write_textures
-from stages.core.artifact import Provenance, Schema, peek, plain_options, read_manifest, run_log, write_manifest
+from stages.core.artifact import (
+    Provenance,
+    Schema,
+    peek,
+    plain_options,
+    read_manifest,
+    run_log,
+    sha256_file,
+    write_manifest,
+)
 from stages.core.images import write_png
 from stages.core.parallel import beside, cores
 from stages.core.progress import Progress, silent
@@ -21,8 +30,8 @@ from stages.material.relief import gentle
 from stages.material.surface import Surface
 from stages.material.swatch import swatch
 from stages.prior.explain import HEADINGS, explained
-from stages.prior.model import load_prior
 from stages.prior.prompt import read_prompt
+from stages.prior.vocabulary import WEIGHTS_FILE, ShippedWords
 from stages.swatch.options import SwatchOptions
 from stages.swatch.render import preview
 
@@ -45,13 +54,12 @@ class SwatchResult:
 
 def make_swatch(out: Path, options: SwatchOptions, force: bool = False, progress: Progress = silent) -> SwatchResult:
     """Write the maps of a prompt's material. Raises: InputError, ArtifactError, OutputError."""
-    prior = load_prior()
     library = Library(options.library) if options.library else None
-    read = read_prompt(options.prompt, prior, options.seed, options.metres, library)
+    read = read_prompt(options.prompt, ShippedWords(), options.seed, options.metres, library)
     scans = library.used({coat.look for coat in read.coats}) if library else {}
     chosen = plain_options(options)
     del chosen["library"]
-    wanted = Provenance(chosen, options.seed, {"prior": prior.identity["weights"], **hashes(scans)})
+    wanted = Provenance(chosen, options.seed, {"prior": sha256_file(WEIGHTS_FILE), **hashes(scans)})
     known = peek(out, SWATCH)
     if known and known.same_request(wanted) and not force:
         return SwatchResult(out, True, sorted(read_manifest(out, SWATCH)[1]), known.extra)

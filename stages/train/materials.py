@@ -15,7 +15,7 @@ from stages.core.color import srgb_encode
 from stages.material.recipe import Coat, Mask, Recipe
 from stages.prior.model import VOCABULARY_FILE
 from stages.prior.prompt import Reading
-from stages.prior.text import Vocabulary
+from stages.prior.vocabulary import Vocabulary
 from stages.train.captions import caption, phrase, substance
 
 COLOR, CHANNEL, ROUGHNESS = 0.03, 0.018, 0.05

@@ -35,7 +35,7 @@ from stages.core.errors import NumericalError
 from stages.core.progress import Progress, silent
 from stages.prior.model import VOCABULARY_FILE, WEIGHTS, PriorNetwork, save_weights
 from stages.prior.profile import drop
-from stages.prior.text import Vocabulary
+from stages.prior.vocabulary import Vocabulary
 from stages.train.batches import Batch, CaptionBatch, CaptionBatches, PictureBatches, Tiles
 from stages.train.options import TrainPriorOptions
 from stages.train.render import render_shards

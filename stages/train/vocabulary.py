@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from stages.core.artifact import Provenance, save_npz, sha256_file
 from stages.prior.colors import WORDS
 from stages.prior.names import FINISHES, FINISHES_METAL, HELD_OUT, OBJECTS, SUBSTANCES
-from stages.prior.text import VOCABULARY
+from stages.prior.vocabulary import VOCABULARY
 from stages.train.captions import template_words
 from stages.train.dictionary import INDEX, PARTS, Explainer, Sense, by_word, senses
 

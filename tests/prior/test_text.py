@@ -5,7 +5,8 @@ import torch
 from stages.prior.colors import WORDS
 from stages.prior.model import VOCABULARY_FILE
 from stages.prior.names import OBJECTS, SUBSTANCES
-from stages.prior.text import MAX_WORDS, TextEmbedding, TextEncoder, Vocabulary, split_words
+from stages.prior.text import TextEmbedding, TextEncoder
+from stages.prior.vocabulary import MAX_WORDS, Vocabulary, split_words
 from stages.train.captions import template_words
 
 

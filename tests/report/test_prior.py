@@ -13,7 +13,7 @@ from stages.light import lights
 from stages.prior.colors import WORDS
 from stages.prior.model import VOCABULARY_FILE
 from stages.prior.names import FINISHES, OBJECTS, SUBSTANCES
-from stages.prior.text import Vocabulary
+from stages.prior.vocabulary import Vocabulary
 from stages.report import ground, prior
 from stages.report.options import PriorReportOptions
 from stages.report.prompts import IDENTIFIED, PROMPTS, Meaning, Prompt

@@ -1,6 +1,8 @@
 """Swatches: a folder of maps that tile, said what was understood, the same bytes again, errors in one line."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +52,14 @@ def test_the_same_request_is_up_to_date_and_another_seed_is_not(bricks: Path, tm
     other = make_swatch(tmp_path / "other", SwatchOptions("red brick with moss", seed=1, **SMALL))  # type: ignore[arg-type]
     for name in ("albedo.png", "normal.exr"):
         assert (again.folder / name).read_bytes() == (bricks / name).read_bytes() != (other.folder / name).read_bytes()
+
+
+def test_a_material_of_known_words_needs_no_tensors(tmp_path: Path) -> None:
+    """Two seconds of torch's import would be a fifth of the command's time."""
+    make = f"make_swatch(Path({str(tmp_path / 'steel')!r}), SwatchOptions('brushed steel', size=256, preview_size=32))"
+    code = f"from tests.swatch.test_stage import *; {make}; print([m for m in ('torch',) if m in sys.modules])"
+    run = subprocess.run([sys.executable, "-c", f"import sys; {code}"], capture_output=True, text=True, check=True)
+    assert run.stdout == "[]\n"
 
 
 def test_normals_lean_away_from_a_slope() -> None:

@@ -9,7 +9,7 @@ from stages.material.surface import Surface
 from stages.prior.colors import WORDS
 from stages.prior.names import HELD_OUT, SUBSTANCES
 from stages.prior.prompt import Reading
-from stages.prior.text import split_words
+from stages.prior.vocabulary import split_words
 from stages.train import captions, materials
 
 

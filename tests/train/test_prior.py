@@ -11,7 +11,7 @@ from stages.core.errors import NumericalError
 from stages.core.images import read_image
 from stages.core.progress import silent
 from stages.prior.model import VOCABULARY_FILE, PriorNetwork, load_prior, save_weights
-from stages.prior.text import Vocabulary
+from stages.prior.vocabulary import Vocabulary
 from stages.train import prior, render, samples
 from stages.train.batches import CaptionBatches, PictureBatches, Tiles
 from stages.train.options import TrainPriorOptions
