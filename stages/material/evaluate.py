@@ -207,12 +207,21 @@ def turned(found: Look, coat: Coat) -> Look:
     return Look(np.clip(color, DARKEST, 1), roughness, metallic, found.height, found.dye)
 
 
+CLEAN = 0.35
+"""Least share of its contrast that a look keeps in a light colour: dye varies, and white has little of it."""
+
+
 def recolored(color: Array, mean: Array, coat: Coat) -> Array:
-    """Colours about another mean, at the same contrast. Args: color (3, P) linear; mean (3,) OKLab. Returns: (3, P)."""
+    """Colours about another mean, at the same contrast, or less where that mean is lighter than the look's own.
+
+    Args: color (3, P) linear; mean (3,) OKLab. Returns: (3, P).
+    """
     wanted = mean
     if coat.color is not None:
         wanted = to_oklab(srgb_decode(np.array(coat.color, np.float64))[:, None])[:, 0].astype(np.float32)
     lab = to_oklab(np.maximum(color, 1e-5)).astype(np.float32)
-    lightness = wanted[0] * (1 + coat.contrast * (lab[0] / mean[0] - 1))
-    gain = np.float32(coat.contrast * min(1.0, max(wanted[0] / mean[0], 0.3)))
+    density = np.log(min(wanted[0], 0.999)) / np.log(min(mean[0], 0.99))
+    kept = np.float32(coat.contrast * min(1.0, max(density, CLEAN)))
+    lightness = wanted[0] * (1 + kept * (lab[0] / mean[0] - 1))
+    gain = np.minimum(kept, np.float32(coat.contrast * max(wanted[0] / mean[0], 0.3)))
     return from_oklab(np.stack([np.clip(lightness, 0.02, 1), *(wanted[k] + gain * (lab[k] - mean[k]) for k in (1, 2))]))

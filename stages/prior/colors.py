@@ -95,7 +95,7 @@ SHADES = {
     "mulled wine": "#5a2238", "beetroot": "#7a1c40", "hibiscus": "#c02860", "cyclamen": "#d05a96", "verdant": "#2f7a3a",
     "candyfloss pink": "#f4aecb", "candy floss pink": "#f4aecb",
     "golden brown": "#a5682a", "golden orange": "#e08a1c", "golden tan": "#c8964e", "golden blonde": "#d8b470",
-    "fox red": "#b4561f",
+    "fox red": "#b4561f", "mint green": "#a3d9b5",
     "glacier blue": "#a8cfe0", "arctic blue": "#b4d6e6", "gulf blue": "#5aa8d0", "delphinium": "#5068b0",
     "iron grey": "#5c5f61",
 }

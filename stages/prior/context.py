@@ -3,10 +3,10 @@
 from dataclasses import replace
 from itertools import pairwise
 
-from stages.prior.colors import COLORS, LEANINGS
+from stages.prior.colors import CHANGES, COLORS, LEANINGS
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import ANIMALS, GATHERS, ONCE, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region
+from stages.prior.places import ANIMALS, PARTS, PEELS, PRINTED, SHAPES, SHELLED, SHOWS, Region, gathering
 from stages.prior.stuffs import KNOWN, ROOFS
 from stages.prior.tokens import FOODS, PAINTED, Join, singulars
 
@@ -28,8 +28,13 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             one.much, other.much = 0.6 * one.much, 0.6 * other.much
     if len(phrases) > 1 and phrases[0].thing and not phrases[0].says_stuff and phrases[1].join.kind == "with":
         skin = phrases[1]
-        if skin.substance in SKINS and not skin.region:  # "an orc with green skin"
+        if skin.substance.split(" ")[-1] in SKINS and not skin.region:  # "an orc with green skin"
             skin.region, skin.where = PARTS["body"], "body"
+    _shade(phrases)
+    _scorch(phrases)
+    for phrase in phrases:
+        if phrase.where.split(" ")[-1] in USUAL and not phrase.says_what:
+            phrase.substance, *phrase.colors = USUAL[phrase.where.split(" ")[-1]]
     phrases = _grounded(_marked(_checked(_peeled(_painted(phrases)))))
     result: list[Phrase] = []
     for number, phrase in enumerate(phrases):
@@ -79,9 +84,15 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             whole.finish += phrase.finish
             whole.colors += [word for word in phrase.colors if word in LEANINGS]
             _add(whole.weather, phrase.weather)
+        elif len(result) > 1 and _wears_all(phrase, result):
+            for painted in result:
+                if painted.coats or painted.color_only:
+                    _add(painted.weather, phrase.weather)
         elif before and _wears(before, phrase):
             if phrase.coats and not before.coats:  # "a white fence with flaking paint"
-                before.shows = Phrase(substance=before.substance, thing=before.thing)
+                before.shows = phrase.shows or Phrase(substance=before.substance, thing=before.thing)
+                if before.metal:  # "a red metal toolbox, the paint chipped"
+                    before.substance = "painted metal"
             worn = result[0] if phrase.join.kind == "comma" and before.region and not phrase.coats else before
             _add(worn.weather, phrase.weather or [WEARS[phrase.where]])  # "..., steel joints, some scratches"
         elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
@@ -100,8 +111,35 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
     return _in_pairs(_laid(result))
 
 
+USUAL = {**dict.fromkeys(("tyres", "tires", "tyre", "tire"), ("rubber", "black")), **dict.fromkeys(("stand", "tripod"),
+("black iron",))}
+"""Parts that are of the same stuff on all things, where none is said: its name and colours."""
+
 SKINS = frozenset(["skin", "hide", "scales", "feathers", "fur"])
 """What is all that one sees of a beast that has it."""
+
+
+def _shade(phrases: list[Phrase]) -> None:
+    """A pattern that is only darker or lighter is so than what it lies on: "a grey cat with darker stripes"."""
+    for phrase in phrases[1:]:
+        changed = not phrase.says_what and any(word in CHANGES for word in phrase.colors)
+        if changed and phrase.where in SHAPES.keys() - WEARS.keys():
+            first = phrases[0]
+            usual = [word for word in OBJECTS[first.thing].made.split(" ") if is_hue(word)] if first.thing else []
+            ground = [word for word in first.colors if is_hue(word)] or [w for w in [first.substance] if w] or usual[:1]
+            phrase.colors[:0] = ground
+
+
+BURNT = frozenset(["charred", "burnt", "burned"])
+"""Words that say of wood that it is charcoal."""
+
+
+def _scorch(phrases: list[Phrase]) -> None:
+    """Burnt wood that is charred at one place is brown elsewhere: "a burnt wooden crate, charred at the corners"."""
+    first, *rest = phrases
+    if BURNT & set(first.weather) and any(p.region and BURNT & set(p.weather) for p in rest):
+        first.weather = [word for word in first.weather if word not in BURNT]
+        first.colors = first.colors or ["dark"]
 
 
 def _finishes(phrase: Phrase, whole: Phrase) -> bool:
@@ -132,7 +170,7 @@ def _laid(phrases: list[Phrase]) -> list[Phrase]:
         return phrases
     first, on, *rest = phrases
     bare = on.thing and not (on.substance or on.colors or on.unknown or on.animal or on.region)
-    gathers = ONCE.get(first.substance, first.substance) in GATHERS
+    gathers = bool(gathering(first.substance))
     whole = first.substance and not (first.thing or first.region or first.animal or gathers or first.coats)
     if not (bare and whole and on.join.kind == "on") or KNOWN[first.substance][0].look in FOODS:
         return phrases
@@ -271,7 +309,7 @@ def _peeled(phrases: list[Phrase]) -> list[Phrase]:
             return [*before, *phrases[number + 1 :]]
         if coat:  # "peeling paint, grey wood underneath"
             phrase.region, phrase.where, phrase.join = None, "", Join("show")
-        elif number == 1 and phrases[0].substance in GATHERS and phrases[0].region:  # "snow on top, granite underneath"
+        elif number == 1 and gathering(phrases[0].substance) and phrases[0].region:  # "snow on top, granite underneath"
             first = replace(phrase, region=None, where="", join=FIRST)
             return [first, replace(phrases[0], join=Join("with")), *phrases[2:]]
     for number, (thing, coat, off) in enumerate(zip(phrases, phrases[1:], phrases[2:], strict=False)):
@@ -378,6 +416,13 @@ def _wears(before: Phrase, phrase: Phrase) -> bool:
     return again and any(word in SHOWS for word in phrase.weather)
 
 
+def _wears_all(phrase: Phrase, before: list[Phrase]) -> bool:
+    """Whether paint of which no colour is said is that of all painted parts: "lower half red, upper half white,
+    paint chipped"."""
+    plain = phrase.coats and not (phrase.colors or phrase.region) and any(word in SHOWS for word in phrase.weather)
+    return plain and sum(p.coats or p.color_only for p in before) > 1
+
+
 def _add(words: list[str], more: list[str]) -> None:
     words += [word for word in more if word not in words]
 
@@ -397,7 +442,7 @@ def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     dull = bool(before.substance) and not before.metal
     hue = phrase.color_only or (dull and phrase.substance in COLORS and not (phrase.colors or phrase.unknown or phrase.finish))
     unsaid = hue and bool(before.substance or before.unknown) and not before.colors and not before.region
-    gathers = ONCE.get(phrase.substance, phrase.substance) in GATHERS
+    gathers = bool(gathering(phrase.substance))
     return bool(bare and phrase.says_what and not gathers) or unsaid
 
 

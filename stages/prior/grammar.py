@@ -9,7 +9,7 @@ from collections.abc import Callable, Container, Mapping, Sequence
 from stages.prior.context import PAINTS, understood
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import DETAILS, GATHERS, PARTS, SHAPES, Region
+from stages.prior.places import DETAILS, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import PAINTED, Join, Token, tokens_of
 
@@ -123,7 +123,7 @@ def _stands_for_itself(token: Token, now: Phrase, following: Token, article: str
 def _is_painted(token: Token, phrases: list[Phrase]) -> bool:
     """Whether what may be a part is what a coat named before is on: "peeling paint on an old wooden door"."""
     coat, now = phrases[0], phrases[-1]
-    laid = coat.coats or bool(coat.weather) or coat.substance in GATHERS
+    laid = coat.coats or bool(coat.weather) or bool(gathering(coat.substance))
     lies = len(phrases) > 1 and now.join.kind in ("on", "over", "peel") and laid
     own = token.kind == "part" and token.text in OBJECTS and not now.region
     return lies and own and not any(phrase.thing for phrase in phrases)
@@ -165,7 +165,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
     elif kind == "part" and text.startswith("around") and phrase.where in RINGS:
         region = token.value if token.value.share < BAND or token.value.kind == "middle" else token.value._replace(share=BAND)
         phrase.region, phrase.where, phrase.placed = region, text, phrase.says_what  # "a gold ring around the top"
-    elif kind == "part" and phrase.says_what and phrase.where in SHAPES:
+    elif kind == "part" and phrase.where in SHAPES and (phrase.says_what or phrase.where.split(" ")[0] in PAINTS):
         phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "studs around the rim"
     elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
         phrase.thing = text  # "striped cushion"
@@ -207,6 +207,8 @@ def _name(phrase: Phrase, text: str) -> None:
             phrase.region, phrase.where = (PARTS["body"], "body") if text in COATS else (DETAILS, text)
     elif old == "painted" and family(text) in ("metal", "wood"):
         phrase.substance = f"painted {family(text)}"  # "painted yellow metal"
+    elif KNOWN[old][0].look == KNOWN[text][0].look and old not in GENERIC:
+        return  # "thatched straw"
     elif old == "molten":
         phrase.substance = text  # "molten gold"
     elif family(old) == "rust" and family(text) == "metal":

@@ -7,7 +7,7 @@ from stages.prior.colors import COLORS
 from stages.prior.grammar import split
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
-from stages.prior.places import GATHERS, ONCE, PARTS, PARTS_OF, PEELS, SHAPES, Region
+from stages.prior.places import PARTS, PARTS_OF, PEELS, SHAPES, Region, gathering
 from stages.prior.stuffs import KNOWN
 from stages.prior.tokens import Join
 
@@ -18,7 +18,7 @@ Order = tuple[Phrase, list[Phrase]]
 def ordered(phrases: list[Phrase]) -> Order:
     """The base, and what lies over it from below: "spots on tan", "paint peeling off wood" name the upper one first."""
     for after in phrases[1:]:
-        if after.join.kind == "below" and (after.coats or after.substance in GATHERS):
+        if after.join.kind == "below" and (after.coats or gathering(after.substance)):
             after.join = Join("over")  # "iron under peeling paint"
     base = 0
     while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
@@ -36,7 +36,7 @@ def _stands(first: Phrase, second: Phrase) -> bool:
         return False  # "paint peeling off a door"
     part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
     thing = bool(first.thing and first.substance) and second.join.kind == "on" and not second.thing
-    return (part or thing) and not first.region and first.substance not in GATHERS
+    return (part or thing) and not first.region and not gathering(first.substance)
 
 
 LARGE = 0.5
@@ -48,6 +48,8 @@ def _largest(first: Phrase, over: list[Phrase]) -> Order:
     if first.where in PARTS and over and all(p.where in PARTS and p.says_what for p in over):
         parts = [first, *over]
         largest = max(parts, key=lambda p: p.region.share if p.region else 0.0)
+        if (first.where, largest.where) == ("base", "top"):
+            return first, over  # "oak base and gold top"
         if largest is not first and first.region and first.region.share < LARGE:
             return largest, [p for p in parts if p is not largest]
     return first, over
@@ -82,7 +84,7 @@ def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     alone = bool(first.thing) and not (first.substance or first.colors or first.unknown)
     if alone:
         return replace(body, thing=body.thing or first.thing), others
-    if not (first.region or first.substance in (*GATHERS, *ROOFING)):
+    if not (first.region or gathering(first.substance) or first.substance in ROOFING):
         first = replace(first, region=Region("above", 0.4))
     return body, [first, *others]
 
@@ -102,7 +104,7 @@ def _on_ground(thing: Phrase, over: list[Phrase]) -> Order | None:
     """The stuff on which all that was named before lies, if any does: "a mailbox, icicles and frost on blue paint"."""
     beneath = [p.join.kind in ("on", "over") and p.join.beneath and bool(p.substance or p.unknown) for p in over]
     at = beneath.index(True) if any(beneath) else 0
-    laid = all(p.substance in GATHERS or p.coats or p.part or p.where in SHAPES for p in over[:at])
+    laid = all(gathering(p.substance) or p.coats or p.part or p.where in SHAPES for p in over[:at])
     if not at or over[at].region or not laid:
         return None
     said = replace(over[at], thing=thing.thing, join=Join(""), weather=[*thing.weather, *over[at].weather])
@@ -114,7 +116,7 @@ def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
     """A thing with the stuff that is said after it: "armchair upholstered in velvet", "a gnome in the snow, terracotta"."""
     for k, phrase in enumerate(over):
         named = phrase.join.kind == "comma" and bool(phrase.substance) and not phrase.part
-        if k and not (over[k - 1].substance in GATHERS or over[k - 1].weather):
+        if k and not (gathering(over[k - 1].substance) or over[k - 1].weather):
             break
         whole = (_covers(phrase) or _sawn(phrase, thing)) if named or not k else False
         elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
@@ -130,7 +132,7 @@ def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
 
 def _covers(phrase: Phrase) -> bool:
     """Whether what covers a thing is all that one sees of it: leather does, moss does not."""
-    gathers = ONCE.get(phrase.substance, phrase.substance) in GATHERS
+    gathers = bool(gathering(phrase.substance))
     return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
 
 

@@ -33,13 +33,16 @@ PARTS = _table(
     ("label, sticker, decal, screen print", Region("badge", 0.6)),
     ("lettering, letters, numerals, writing", Region("badge", 0.3)),
     ("logo, emblem, badge, insignia, crest, coat of arms, lock, padlock, keyhole, latch, boss, shield boss, umbo, hub, "
-     "doorknob, door knob, doorbell, button in the middle, medallion in the middle, belt buckle, dial", Region("badge", 0.2)),
+     "doorknob, door knob, doorbell, belt buckle", Region("badge", 0.2)),
+    ("dial, dials, watch face, clock face", Region("badge", 0.7)),
     ("middle, waist, midsection, centre, center, central part, middle section, middle part", Region("middle", 0.33)),
-    ("base, bottom, underside, lower half, lower part, bottom half, lower, lower section", Region("below", 0.5)),
+    ("bottom, underside, lower half, lower part, bottom half, lower, lower section", Region("below", 0.5)),
     ("sole, soles, outsole, tread, treads", Region("below", 0.08)),
-    ("pedestal, plinth, stand, socle, foundation, foundations, hem, skirting", Region("below", 0.2)),
+    ("base, pedestal, plinth, stand, socle, foundation, foundations, hem, skirting", Region("below", 0.2)),
     ("exhaust, exhausts, exhaust pipe, exhaust pipes, muffler, tailpipe, chin strap, chinstrap, drawer, drawers, "
      "skids, tracks, caterpillar tracks, undercarriage, suspension, tank treads", Region("below", 0.25)),
+    ("ankle, ankles, knee, knees", Region("below", 0.3)), ("carapace", Region("up", 0.55)),
+    ("window frames, window frame, door frames, door frame, sills", Region("edges", 0.06, 0.04)),
     ("pommel", Region("below", 0.08)),
     ("guard, crossguard, cross-guard, cross guard, handguard, hand guard, tsuba, quillons, bolster", Region("below", 0.36)),
     ("end, one end, far end", Region("above", 0.25)),
@@ -110,7 +113,10 @@ PARTS_OF = _of_things(
     ("guitar, acoustic guitar, electric guitar, violin, cello, ukulele, banjo, lute",
      {"top": Region("badge", 3.0), "back": Region("back", 0.3)}),
     ("lamp, floor lamp, table lamp, desk lamp, street lamp, lamp post",
-     {"stem": Region("below", 0.7), "base": Region("below", 0.15), "shade": Region("above", 0.35)}),
+     {**dict.fromkeys(("stem", "arm", "pole", "stand"), Region("below", 0.7)), "base": Region("below", 0.15),
+     "shade": Region("above", 0.35)}),
+    ("container, cargo container, shipping container, robot, mech, spaceship, locker, fridge, spacecraft, gas pump",
+     dict.fromkeys(("panel", "panels"), PARTS["body"])),
     ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
     ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
      {"roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3),
@@ -146,6 +152,7 @@ SHAPES = _table(
      Region("streaks", 0.2, 0.12, 0.8, 0.25)),
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
     ("sprinkles, confetti", Region("spots", 0.25, 0.05)),
+    ("markings, marking", Region("patches", 0.2, 0.12, 0.3)),
     ("lights, leds, led lights, indicator lights", Region("spots", 0.05, 0.06)),
     ("seeds, pips, specks", Region("spots", 0.1, 0.06)),
     ("rainbow, rainbow stripes, rainbow striped, rainbow bands", Region("bands", 0.9, 0.2)),
@@ -166,6 +173,7 @@ ANIMALS = {
     "panda": ("#ece8e0", "#161514", Region("patches", 0.4, 0.4, 0.1)),
     "ladybird": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
     "ladybug": ("#c4181c", "#121212", Region("spots", 0.25, 0.22)),
+    "tortoiseshell": ("#b0702a", "#38200f #6e4018", Region("patches", 0.45, 0.16, 0.4)),
     "desert camouflage": ("#b89a70", "#8a6a48 #d6c29a #6e5a40", Region("patches", 0.4, 0.2, 0.2)),
     "snow camouflage": ("#dfe2e2", "#a4aaae #f2f3f3 #6e7478", Region("patches", 0.4, 0.2, 0.2)),
     "urban camouflage": ("#8c9094", "#55595d #b8bcc0 #2a2c2e", Region("patches", 0.4, 0.2, 0.2)),
@@ -205,6 +213,12 @@ ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "
         "guano": "bird droppings",
         "green patina": "verdigris", "copper patina": "verdigris", "oxidized copper": "verdigris"}
 """Other names of what gathers."""
+
+def gathering(name: str) -> str:
+    """What of `GATHERS` a substance is: of "fresh snow" it is snow; "" where it is none."""
+    known = ONCE.get(name, name)
+    return next((word for word in (known, known.split(" ")[-1]) if word in GATHERS), "")
+
 
 LAYERED = {"moss": 3e-3, "snow": 8e-3, "rust": 2e-4, "grass": 5e-3}
 """Looks that stand proud of what is beneath, metres."""
@@ -275,7 +289,7 @@ SOAKED, POROUS, SOAK = frozenset(["wet", "damp"]), 0.6, 0.72
 DETAILS = Region("edges", 0.1, 0.04, 0.1)
 """Where a part lies that no table knows."""
 
-SHELLED = frozenset(["ladybird", "ladybug"])
+SHELLED = frozenset(["ladybird", "ladybug", "tortoiseshell"])
 """Animals of `ANIMALS` that have no fur."""
 
 PRINTED = frozenset(name for name in ANIMALS if name.endswith(("camouflage", "camo")))

@@ -17,6 +17,7 @@ from stages.material.look import from_oklab, to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Part, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, TREATMENTS, changed, rgb
+from stages.prior.context import BURNT
 from stages.prior.grammar import split
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
@@ -31,7 +32,6 @@ from stages.prior.places import (
     GATHERS,
     JOINED,
     LAYERED,
-    ONCE,
     PARTS,
     PEELED,
     PEELS,
@@ -45,6 +45,7 @@ from stages.prior.places import (
     WET,
     WHOLE,
     Region,
+    gathering,
 )  # fmt: skip
 from stages.prior.primer import primed
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
@@ -166,7 +167,7 @@ class Reading:
         mask = self._region(phrase).mask(phrase.where)
         if phrase.within and phrase.within.region:
             part = phrase.within.region.mask(phrase.within.where)
-            whole = phrase.join.kind == "cover" and phrase.substance not in GATHERS
+            whole = phrase.join.kind == "cover" and not gathering(phrase.substance)
             masks = (part,) if whole else (part, mask)
             return [Layer(coat, masks, LAYERED.get(coat.look, 0.0)), *self._weather(phrase, masks, beneath)]
         if phrase.join.kind == "fade":
@@ -193,7 +194,7 @@ class Reading:
         return _scaled(self._whole_region(phrase), phrase.much)
 
     def _whole_region(self, phrase: Phrase) -> Region:
-        gathers = GATHERS.get(ONCE.get(phrase.substance, phrase.substance))
+        gathers = GATHERS.get(gathering(phrase.substance))
         if gathers and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", min(0.45, gathers.share) if gathers.kind == "up" else 0.45, gathers.size, gathers.wear)
         if phrase.region:
@@ -227,7 +228,8 @@ class Reading:
             kin = phrase.substance in GENERIC and bool(usual.substance) and _family(usual) == _family(phrase)
             if not phrase.colors and (kin or usual.substance == phrase.substance):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
-            named = "painted wood" if phrase.substance in WOODEN and _gaudy(phrase) else phrase.substance
+            gaudy = {**dict.fromkeys(WOODEN, "painted wood"), **dict.fromkeys(PLAIN_METALS, "painted metal")}
+            named = gaudy.get(phrase.substance, phrase.substance) if _gaudy(phrase) else phrase.substance
             if CORRODES.get(KNOWN[named][0].look) == "verdigris" and _greenish(phrase):
                 named, phrase = "verdigris", replace(phrase, colors=[])  # "copper gone green"
             return self._of(stuff(named, bool(phrase.colors)), phrase)
@@ -374,7 +376,7 @@ class Reading:
         """What shows where a coat is worn through."""
         if phrase.shows:
             return self._coat(phrase.shows)
-        if under and phrase.coats:
+        if under and (phrase.coats or phrase.color_only):
             return under
         own = self._coat(phrase)
         if own.look == "enamel":
@@ -416,8 +418,12 @@ WOODEN = ("wood", "wooden", "timber")
 """Wood of any kind, which is painted where words give it a colour that no wood has."""
 
 
+PLAIN_METALS = ("metal", "steel", "iron", "tin", "sheet metal")
+"""Metals that are painted where words give them a colour that no metal has: "a red metal toolbox"."""
+
+
 def _gaudy(phrase: Phrase) -> bool:
-    """Whether a phrase's colour is one that no wood has of itself: green, blue, red."""
+    """Whether a phrase's colour is one that neither wood nor iron has of itself: green, blue, red."""
     if not any(word in COLORS or word.startswith("#") for word in phrase.colors):
         return False
     _, *chroma = to_oklab(srgb_decode(np.array(_color(phrase)))[:, None])[:, 0]
@@ -454,10 +460,6 @@ def _usual_size(phrases: list[Phrase]) -> float | None:
 def _once(layers: list[Layer]) -> list[Layer]:
     """No layer twice."""
     return list({(layer.coat.look, layer.coat.color, layer.masks): layer for layer in reversed(layers)}.values())[::-1]
-
-
-BURNT = frozenset(["charred", "burnt", "burned"])
-"""Words that say of wood that it is charcoal."""
 
 
 MATT = 0.65
@@ -506,7 +508,7 @@ def _described(wanted: Stuff, named: RGB) -> RGB:
     if wanted.paintable or wanted.metallic or wanted.look in PAINTABLE:
         return named
     own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
-    if float(np.linalg.norm(own - other)) > SIMILAR or np.hypot(*other[1:]) < GREYISH / 2 < np.hypot(*own[1:]) / 2:
+    if float(np.linalg.norm(own - other)) > SIMILAR or np.hypot(*other[1:]) < GREYISH / 2 < np.hypot(*own[1:]):
         return named
     return _triple(np.array(wanted.color) + 0.3 * (np.array(named) - np.array(wanted.color)))
 

@@ -233,6 +233,13 @@ SIMILES = (
     (r"\b(?:an? )?(?:crackled?|cracked|crazed|craquelure) (?:glaze|glazing)\b", "glaze crackled"),
     (r",\s*(?:on |against )?(?:an? )?(?:plain |clean )?(?:white|black|gr[ea]y|dark|neutral|transparent|plain|clean|studio) "
      r"background\b", ","),
+    (r"(?<!yellow )(?<!black )(?<!white )(?<!red )\b(?:hazard|warning|caution) (?:stripes|striping|tape)\b",
+    "yellow and black stripes"),
+    (r",? half[- ](?:dipped|submerged|buried) in\b", ", lower half"),
+    (r"(?:,| with| in)(?: an?)? ((?:light |dark |medium |warm |deep |rich )?)"
+     r"(?!coffee|water|blood|rust|grass|oil|wine|ink|tea|dirt)([a-z]+) stain\b", r", \1\2 coloured"),
+    (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot)\b", r"with a \1\2 at the lower third"),
+    (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
     (r"\b([a-z]+) and ([a-z]+) marbled\b", r"\1 and \2 swirled"),
     (r"\b(?:8|number eight)[ -]?ball\b", "eight ball"),
@@ -432,7 +439,9 @@ def _resolved(found: list[Token]) -> list[Token]:
                 token = Token("color", token.text)
         if token.kind == "color" and token.article and not ahead and token.text in OBJECTS:
             token = Token("thing", token.text)  # "an orange"
-        elif token.kind == "thing" and token.text in KNOWN and (not names or _stands_before(ahead, behind)):
+        elif token.text in ("shell", "carapace") and any(t.text in BEARERS for t in result):
+            token = Token("part", "carapace", PARTS["carapace"])
+        elif token.kind == "thing" and token.text in KNOWN and _is_stuff(token, ahead, behind):
             token = Token("substance", token.text)
         elif token.kind == "part" and token.text in WORN & OBJECTS.keys() and not any(t.kind == "thing" for t in result):
             token = Token("thing", token.text)  # "faded jeans"
@@ -440,6 +449,18 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("part", token.text, PARTS[token.text])
         result.append(token)
     return result
+
+
+BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beetle", "armadillo")
+"""Beasts with a shell."""
+
+
+def _is_stuff(token: Token, ahead: list[Token], behind: list[Token]) -> bool:
+    """Whether what may be a stuff or a thing is the stuff."""
+    names = {t.kind for t in ahead} & {"substance", "thing"}
+    if names:
+        return _stands_before(ahead, behind)
+    return bool(ahead or behind) or " with " not in OBJECTS[token.text].made  # "a strawberry" has seeds
 
 
 def _stands_before(ahead: list[Token], behind: list[Token]) -> bool:
@@ -507,6 +528,8 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("filler", [f"{word} {place}" for word in ("from the", "from its", "down from the") for place in PARTS])
     enter("part", {f"up to {the}{place}": Region("below", 0.45) for the in ("", "the ", "its ") for place in PARTS})
     enter("part", {f"up from {the}{place}": Region("below", 0.45) for the in ("", "the ", "its ") for place in PARTS})
+    for side, strip in (("base", "below"), ("bottom", "below"), ("top", "above")):
+        enter("part", {f"{word} {side}": Region(strip, 0.18) for word in ("along the", "along its")})
     enter("aside", ASIDE)
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
     for known, *others in rows("spellings.tsv"):
