@@ -18,7 +18,7 @@ from stages.material.surface import Array, Surface
 SIDES = ("below", "above", "middle", "front", "back", "left", "right", "sides", "badge", "fade")
 """Kinds that cover a share of the extent, not of the surface."""
 
-DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "zigzag", "spots", "dots", "checks", "veins")
+DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "zigzag", "spots", "dots", "flowers", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
 
 CENTRED = ("middle", "sides", "badge")
@@ -110,6 +110,8 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
         return np.where((np.floor(u) + np.floor(v)) % 2 == 0, away, -away).astype(np.float32)
     if mask.kind == "dots":
         return _dots(mask, at)
+    if mask.kind == "flowers":
+        return _flowers(mask, at)
     if mask.kind == "zigzag":
         u, v = at.flat.p[:2] / np.float32(mask.size)
         return np.float32(0.7071 * mask.size) * _middle(v + abs(u - np.rint(u)))
@@ -148,6 +150,24 @@ def _dots(mask: Mask, at: Place) -> Array:
     half = np.float32(0.5)
     near = (np.hypot(*(grid - np.rint(grid))), np.hypot(*(grid - half - np.rint(grid - half))))
     return -np.float32(mask.size) * np.minimum(*near)
+
+
+PETALS, HEART = 5, 0.07
+"""Of a flower: how many petals, and the radius of the hole in its middle, sizes of the mask."""
+
+
+def _flowers(mask: Mask, at: Place) -> Array:
+    """Distance inward from the border of the nearest flower, each turned by chance, in staggered rows; object sizes."""
+    grid = at.flat.p[:2] / np.float32(mask.size)
+    best = np.full(len(at), -np.inf, np.float32)
+    for shift in (np.float32(0), np.float32(0.5)):
+        cell = np.rint(grid - shift)
+        across, up = grid - shift - cell
+        turn = np.float32(2 * np.pi) * (np.sin(cell[0] * np.float32(12.9898) + cell[1] * np.float32(78.233)) * 437.585 % 1)
+        away = np.hypot(across, up)
+        petal = 0.23 + 0.08 * np.cos(PETALS * (np.arctan2(up, across) - turn))
+        best = np.maximum(best, np.minimum(petal - away, away - HEART))
+    return (np.float32(mask.size) * best).astype(np.float32)
 
 
 def _gingham(mask: Mask, at: Place) -> Array:
@@ -194,6 +214,8 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
     def settle(mask: Mask, place: Place) -> Mask:
         if mask.kind in ("all", "gingham") or mask.level is not None:
             return mask
+        if mask.kind == "flowers":
+            return replace(mask, level=0.0)
         if mask.kind == "dots":  # two in each square
             return replace(mask, level=-mask.size * float(np.sqrt(mask.share / (2 * np.pi))))
         if mask.kind in SIDES and mask.said and (part := found(mask, surface)):

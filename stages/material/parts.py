@@ -14,7 +14,7 @@ from stages.material.recipe import Mask
 from stages.material.surface import Surface
 
 LEGS = ("leg", "legs", "foot", "feet")
-HANDLES = ("handle", "handles", "grip", "hilt", "haft", "shaft")
+HANDLES = ("handle", "handles", "grip", "hilt", "haft", "shaft", "wrapping", "wrap", "wraps", "binding")
 HEADS = ("blade", "blades", "head")
 SPOUTS = ("spout",)
 GUARDS, POMMELS = ("guard", "crossguard", "cross-guard", "tsuba", "quillons", "bolster"), ("pommel",)

@@ -11,7 +11,7 @@ from typing import Any
 KINDS = (
     "all", "below", "above", "middle", "front", "back", "left", "right", "sides", "badge", "fade",
     "edges", "crevices", "up", "down", "hidden",
-    "spots", "dots", "stripes", "bands", "zigzag", "checks", "gingham", "veins",
+    "spots", "dots", "flowers", "stripes", "bands", "zigzag", "checks", "gingham", "veins",
     "patches", "streaks", "scratches", "chips", "pieces", "along",
 )  # fmt: skip
 """Ways to say where a layer lies; see `masks.py`."""

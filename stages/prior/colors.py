@@ -96,6 +96,7 @@ SHADES = {
     "candyfloss pink": "#f4aecb", "candy floss pink": "#f4aecb",
     "golden brown": "#a5682a", "golden orange": "#e08a1c", "golden tan": "#c8964e", "golden blonde": "#d8b470",
     "fox red": "#b4561f", "mint green": "#a3d9b5",
+    "grey green": "#7d8f7a", "green grey": "#7d8f7a", "grey brown": "#7d7166", "brown grey": "#7d7166",
     "glacier blue": "#a8cfe0", "arctic blue": "#b4d6e6", "gulf blue": "#5aa8d0", "delphinium": "#5068b0",
     "iron grey": "#5c5f61",
 }

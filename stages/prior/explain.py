@@ -12,7 +12,7 @@ PLACES = {
     "edges": "{} on edges",
     "crevices": "{} in crevices", "hidden": "innermost {}", "spots": "spots, {}", "stripes": "stripes, {}",
     "bands": "bands, {}",
-    "dots": "dots, {}", "zigzag": "zigzag, {}", "gingham": "gingham, {}",
+    "dots": "dots, {}", "flowers": "flowers, {}", "zigzag": "zigzag, {}", "gingham": "gingham, {}",
     "checks": "checks, {}", "veins": "veins, {}", "patches": "patches, {}", "streaks": "streaks, {}",
     "scratches": "scratches, {}",
     "chips": "chips, {}", "pieces": "pieces of their own", "along": "by its shape",

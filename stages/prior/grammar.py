@@ -6,7 +6,8 @@ no table knows, a dictionary may explain by colours; the rest is kept as unknown
 
 from collections.abc import Callable, Container, Mapping, Sequence
 
-from stages.prior.context import PAINTS, understood
+from stages.prior.context import understood
+from stages.prior.motifs import PAINTS
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
 from stages.prior.places import DETAILS, PARTS, SHAPES, Region, gathering
@@ -209,6 +210,8 @@ def _name(phrase: Phrase, text: str) -> None:
         phrase.substance = f"painted {family(text)}"  # "painted yellow metal"
     elif KNOWN[old][0].look == KNOWN[text][0].look and old not in GENERIC:
         return  # "thatched straw"
+    elif text == "shell" and family(old) in ("plastic", "metal", "paint"):
+        return  # "a plastic shell"
     elif old == "molten":
         phrase.substance = text  # "molten gold"
     elif family(old) == "rust" and family(text) == "metal":

@@ -25,7 +25,7 @@ def ordered(phrases: list[Phrase]) -> Order:
         base += 1
     upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
     first, over = phrases[base], [*reversed(upper), *phrases[base + 1 :]]
-    for step in (_largest, _framed, _of_body, _told_after, _either_side, _bared, in_its_places, _smaller_last):
+    for step in (in_its_places, _largest, _framed, _of_body, _told_after, _either_side, _bared, _smaller_last):
         first, over = step(first, over)
     return first, over
 

@@ -43,6 +43,7 @@ PARTS = _table(
      "skids, tracks, caterpillar tracks, undercarriage, suspension, tank treads", Region("below", 0.25)),
     ("ankle, ankles, knee, knees", Region("below", 0.3)), ("carapace", Region("up", 0.55)),
     ("window frames, window frame, door frames, door frame, sills", Region("edges", 0.06, 0.04)),
+    ("raised areas, raised parts, high points, high spots, raised details", Region("edges", 0.3, 0.1, 0.3)),
     ("pommel", Region("below", 0.08)),
     ("guard, crossguard, cross-guard, cross guard, handguard, hand guard, tsuba, quillons, bolster", Region("below", 0.36)),
     ("end, one end, far end", Region("above", 0.25)),
@@ -69,7 +70,7 @@ PARTS = _table(
     ("seat, cushion, cushions, tabletop, table top, shelf, shelves, upholstery, desktop, countertop", Region("up", 0.3)),
     ("tip, point, spire, finial, tips, horns, antlers, knob", Region("above", 0.1)),
     ("blade, blades, barrel of it", Region("above", 0.7)),
-    ("handle, grip, hilt, haft, shaft, handles, handlebar, stock", Region("below", 0.3)),
+    ("handle, grip, hilt, haft, shaft, wrapping, wrap, wraps, binding, handles, handlebar, stock", Region("below", 0.3)),
     ("front, front side, fascia, door, front half, screen, windows, window, windshield, windscreen, visor, faceplate, "
      "face plate, grille, grill, panel, panels, chest plate, chest, beard", Region("front", 0.3)),
     ("beak, nose, snout, eyes, nozzle, toe, toes, toe cap, toe caps, toecap, toecaps", Region("front", 0.12)),
@@ -78,8 +79,8 @@ PARTS = _table(
     ("belly, underbelly, bottom side", Region("down", 0.3)),
     ("trim, trims, edges, edging, edge, borders, border, trimming, piping, frame, corners, corner, outline, outlines, accents, "
      "edge trim, highlights, details, detailing, decoration, decorations, ornaments, fittings, hardware, hinges, "
-     "beams, ribs, clasps, buckle, buckles, fringe, tassels, moulding, molding, ridges, bezel, stitching, laces, "
-     "shoelaces, scabbard, sheath, clasp, rivet heads",
+     "beams, ribs, fringe, tassels, moulding, molding, ridges, bezel, stitching, laces, "
+     "shoelaces, scabbard, sheath, rivet heads",
      Region("edges", 0.1, 0.04, 0.1)),
     ("crevices, grooves, cracks, recesses, joints, hollows, crannies, folds, engraving, engravings, gaps, seams, crevice, "
      "carvings, between the scales, between its scales, between the bricks, between the stones, "
@@ -117,6 +118,9 @@ PARTS_OF = _of_things(
      "shade": Region("above", 0.35)}),
     ("container, cargo container, shipping container, robot, mech, spaceship, locker, fridge, spacecraft, gas pump",
      dict.fromkeys(("panel", "panels"), PARTS["body"])),
+    ("armchair, sofa, couch, settee, ottoman, lounge chair", {"upholstery": PARTS["body"], "cushions": Region("up", 0.45)}),
+    ("house, cottage, stone cottage, building, villa, church, chapel, shop, cabin, hut, barn, townhouse",
+     {"door": Region("badge", 0.25), "doors": Region("badge", 0.25)}),
     ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
     ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
      {"roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3),
@@ -153,6 +157,10 @@ SHAPES = _table(
     ("scratches, scrapes, scuffs", Region("scratches", 0.06, 0.1, 0.8)),
     ("sprinkles, confetti", Region("spots", 0.25, 0.05)),
     ("markings, marking", Region("patches", 0.2, 0.12, 0.3)),
+    ("clasps, clasp, buckle, buckles", Region("spots", 0.05, 0.08)),
+    ("floral, floral pattern, floral motif, floral print, floral design, flower pattern, flower print, flowers, paisley",
+     Region("flowers", 0.3, 0.13)),
+    ("armour plates, armor plates", Region("patches", 0.5, 0.25)),
     ("lights, leds, led lights, indicator lights", Region("spots", 0.05, 0.06)),
     ("seeds, pips, specks", Region("spots", 0.1, 0.06)),
     ("rainbow, rainbow stripes, rainbow striped, rainbow bands", Region("bands", 0.9, 0.2)),

@@ -17,8 +17,8 @@ from stages.material.look import from_oklab, to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Part, Recipe
 from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, TREATMENTS, changed, rgb
-from stages.prior.context import BURNT
 from stages.prior.grammar import split
+from stages.prior.implied import BURNT
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
 from stages.prior.order import ROOFING, in_its_places, ordered
@@ -225,7 +225,7 @@ class Reading:
             return replace(coal, said=f"charred {phrase.substance}")
         if phrase.substance:
             usual = split(made)[0] if made else Phrase()
-            kin = phrase.substance in GENERIC and bool(usual.substance) and _family(usual) == _family(phrase)
+            kin = phrase.substance in GENERIC and bool(usual.substance) and _family(usual) == _family(phrase) != "stone"
             if not phrase.colors and (kin or usual.substance == phrase.substance):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
             gaudy = {**dict.fromkeys(WOODEN, "painted wood"), **dict.fromkeys(PLAIN_METALS, "painted metal")}
@@ -243,6 +243,8 @@ class Reading:
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
         if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
+        if phrase.colors and phrase.where.split(" ")[-1] in ("sole", "soles", "outsole", "tread", "treads"):
+            return self._of(stuff("rubber", True), phrase)
         if phrase.colors and phrase.where.split(" ")[-1] in SOFT:
             return self._of(stuff("fabric", True), phrase)
         if beneath is not None and phrase.colors:  # of the same stuff
@@ -362,6 +364,8 @@ class Reading:
         for word in _weathers(phrase):
             weather = WEATHER[word]
             coat = self._named(_corroded(weather.stuff, phrase)) if weather.stuff else self._beneath(phrase, under)
+            if word == "marbled" and coat.color is not None:
+                coat = replace(coat, color=_triple(np.array(coat.color) + MARBLING * (1 - np.array(coat.color))))
             mask = _scaled(weather.region, phrase.amount.get(word, 1.0)).mask(word)
             if not weather.stuff and phrase.shows and phrase.shows.region:
                 mask = phrase.shows.region.mask(phrase.shows.where)
@@ -461,6 +465,9 @@ def _once(layers: list[Layer]) -> list[Layer]:
     """No layer twice."""
     return list({(layer.coat.look, layer.coat.color, layer.masks): layer for layer in reversed(layers)}.values())[::-1]
 
+
+MARBLING = 0.4
+"""How much of white lighter the veins are of what is only called marbled."""
 
 MATT = 0.65
 """Least roughness of what is camouflaged."""

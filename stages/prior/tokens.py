@@ -233,13 +233,15 @@ SIMILES = (
     (r"\b(?:an? )?(?:crackled?|cracked|crazed|craquelure) (?:glaze|glazing)\b", "glaze crackled"),
     (r",\s*(?:on |against )?(?:an? )?(?:plain |clean )?(?:white|black|gr[ea]y|dark|neutral|transparent|plain|clean|studio) "
      r"background\b", ","),
-    (r"(?<!yellow )(?<!black )(?<!white )(?<!red )\b(?:hazard|warning|caution) (?:stripes|striping|tape)\b",
+    (r"(?:(?<=with )|(?<=and )|(?<=, )|^)(?:hazard|warning|caution) (?:stripes|striping|tape)\b",
     "yellow and black stripes"),
     (r",? half[- ](?:dipped|submerged|buried) in\b", ", lower half"),
     (r"(?:,| with| in)(?: an?)? ((?:light |dark |medium |warm |deep |rich )?)"
      r"(?!coffee|water|blood|rust|grass|oil|wine|ink|tea|dirt)([a-z]+) stain\b", r", \1\2 coloured"),
     (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot)\b", r"with a \1\2 at the lower third"),
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
+    (r"\b(?:burnt|burned|scorched|charred|soot) and blackened\b", "charred"),
+    (r"\bblackened (?=at|on|along|around|near|in)", "charred "),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
     (r"\b([a-z]+) and ([a-z]+) marbled\b", r"\1 and \2 swirled"),
     (r"\b(?:8|number eight)[ -]?ball\b", "eight ball"),

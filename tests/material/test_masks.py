@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import label
 
 from stages.material.masks import coverage, settled
 from stages.material.place import Place
@@ -94,6 +95,13 @@ def test_dots_are_equal_and_stand_in_staggered_rows() -> None:
     assert abs(whole.mean() - 0.25) < 0.02
     near = np.roll(whole, (32, 32), (0, 1))  # half of the spacing each way
     assert abs(whole - near)[64:, 64:].mean() < 0.01 < abs(whole - np.roll(whole, 32, 1)).mean()
+
+
+def test_flowers_are_apart_and_crisp() -> None:
+    flowers = covered(Mask("flowers", 0.3, 0.25, 0.0), 256)
+    assert 0.25 < flowers.mean() < 0.4 and ((flowers > 0.05) & (flowers < 0.95)).mean() < 0.1
+    _, count = label(flowers[32:-32, 32:-32] > 0.5)
+    assert 12 <= count <= 32  # two in each square, those at the border cut
 
 
 def test_gingham_has_three_tones() -> None:

@@ -1,0 +1,105 @@
+"""What phrases say without saying it: tyres are rubber, knobs are on the front, skin is all over."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+from stages.prior.colors import CHANGES
+from stages.prior.objects import OBJECTS
+from stages.prior.phrases import Phrase, is_hue
+from stages.prior.places import PARTS, SHAPES, Region
+from stages.prior.stuffs import ROOFS
+from stages.prior.tokens import singulars
+
+
+def implied(phrases: list[Phrase]) -> None:
+    """Say it, in place. Args: phrases: one or more."""
+    for step in (_alone, _listed, _bodies, _fronts, _shade, _scorch, _stuffs):
+        step(phrases)
+
+
+def _alone(phrases: list[Phrase]) -> None:
+    """A part that is all that is named is the thing: "a tire"."""
+    first = phrases[0]
+    thing = next((name for name in (first.where, *singulars(first.where)) if name in OBJECTS), "")
+    if not first.says_what and thing and len(phrases) == 1:
+        phrases[0] = replace(first, thing=thing, region=None, where="")
+
+
+def _listed(phrases: list[Phrase]) -> None:
+    """What joins the first of a list joins the others: "crusted with salt and green corrosion"."""
+    for one, other in pairwise(phrases):
+        listed = other.join.kind == "and" and one.join.kind in LISTED and one.substance and other.substance
+        if listed and not (one.region or other.region):
+            other.join = one.join
+            one.much, other.much = 0.6 * one.much, 0.6 * other.much
+
+
+def _bodies(phrases: list[Phrase]) -> None:
+    """A beast's skin is all that one sees of it: "an orc with green skin"."""
+    first, *rest = phrases
+    for number, skin in enumerate(rest if first.thing and not first.says_stuff else []):
+        told = bool(skin.colors) or not number
+        joined = skin.join.kind in ("with", "and", "comma") and not skin.region
+        if told and joined and skin.substance.split(" ")[-1] in SKINS:
+            skin.region, skin.where = PARTS["body"], "body"
+
+
+def _fronts(phrases: list[Phrase]) -> None:
+    """Knobs and buttons are on the front."""
+    for phrase in phrases:
+        if phrase.where in ("knobs", "buttons") and not phrase.within:
+            phrase.within = Phrase(region=Region("badge", 1.4), where="front")
+
+
+def _stuffs(phrases: list[Phrase]) -> None:
+    """Parts that are of the same stuff on all things; of what roofs are laid."""
+    for phrase in phrases:
+        part = phrase.where.split(" ")[-1]
+        if part in USUAL and not phrase.says_what:
+            phrase.substance, phrase.colors = USUAL[part][0], list(USUAL[part][1])
+        if phrase.where.endswith("roof"):
+            phrase.substance = ROOFS.get(phrase.substance, phrase.substance)
+
+
+USUAL = {
+    **dict.fromkeys(("tyres", "tires", "tyre", "tire"), ("rubber", ["black"])),
+    **dict.fromkeys(("stand", "tripod"), ("black iron", [])),
+}  # fmt: skip
+"""Parts that are of the same stuff on all things, where none is said: its name and colours."""
+
+SKINS = frozenset(["skin", "hide", "scales", "feathers", "fur"])
+"""What is all that one sees of a beast that has it."""
+
+
+def _shade(phrases: list[Phrase]) -> None:
+    """A pattern that is only darker or lighter is so than what it lies on: "a grey cat with darker stripes"."""
+    for phrase in phrases[1:]:
+        changed = not phrase.says_what and any(word in CHANGES for word in phrase.colors)
+        if changed and phrase.where in SHAPES.keys() - WEARS.keys():
+            first = phrases[0]
+            usual = [word for word in OBJECTS[first.thing].made.split(" ") if is_hue(word)] if first.thing else []
+            ground = [word for word in first.colors if is_hue(word)] or [w for w in [first.substance] if w] or usual[:1]
+            phrase.colors[:0] = ground
+
+
+BURNT = frozenset(["charred", "burnt", "burned"])
+"""Words that say of wood that it is charcoal."""
+
+
+def _scorch(phrases: list[Phrase]) -> None:
+    """Burnt wood that is charred at one place is brown elsewhere: "a burnt wooden crate, charred at the corners"."""
+    first, *rest = phrases
+    if BURNT & set(first.weather) and any(p.region and BURNT & set(p.weather) for p in rest):
+        first.weather = [word for word in first.weather if word not in BURNT]
+        first.colors = first.colors or ["dark"]
+
+
+LISTED = ("cover", "partly", "spots", "inlay", "stud", "streak", "edge")
+"""Joins that hold for all that "and" goes on with."""
+
+WEARS = {
+    **dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained", "cracks": "cracked",
+    **dict.fromkeys(("streaks", "drips", "water stains", "rain streaks", "water streaks", "water marks"), "streaky"),
+    **dict.fromkeys(("smudges", "smears"), "dirty"),
+}  # fmt: skip
+"""Patterns that are wear where no stuff is named for them."""
