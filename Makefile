@@ -42,7 +42,7 @@ OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" 
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test test-workflow test-cluster campaign pages poor hostile uvs parts lint asset batch scene export docs bench beside clean
+.PHONY: help setup demo test test-workflow test-cluster campaign pages poor hostile uvs parts lint asset batch scene export docs bench beside bounces clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -170,6 +170,16 @@ bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light 
 	$(DREAMMAT) report conditions demo/prep.npz -o bench $$(cat $(MITSUBA) $(CYCLES))
 	@echo "look at bench/conditions.png"
 	$(MAKE) beside
+
+bounces: bench/bowl.npz bench/urn.npz | $(MITSUBA)  ## light between surfaces beside Mitsuba's path tracer, five materials (minutes)
+	[ ! -s $(MITSUBA) ] || $(RUN)/python -m stages.report.bounces $$(sed 's/--mitsuba //' $(MITSUBA)) bench/bounces.csv studio $^
+	@echo "look at bench/bounces.csv"
+
+bench/urn.npz: demo/urn.obj
+	$(DREAMMAT) prep $< -o $@
+
+bench/bowl.npz: examples/bowl.py | $(VENV)/.ready
+	$(RUN)/python $< bench/bowl.obj && $(DREAMMAT) prep bench/bowl.obj -o $@
 
 bench/egg.obj: examples/convex.py | $(VENV)/.ready
 	$(RUN)/python $< bench

@@ -249,7 +249,7 @@ def _pyramid(base: NDArray) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
     levels, start = [], [0]
     while True:
         levels.append(np.zeros(((len(level) + 2) ** 2, CHANNELS), np.float32))
-        levels[-1][:, :used] = _bordered(level).reshape(-1, used)
+        levels[-1][:, :used] = bordered(level).reshape(-1, used)
         if len(level) == 1:
             return np.concatenate(levels), np.array(start, np.int64)
         start.append(start[-1] + len(levels[-1]))
@@ -257,7 +257,7 @@ def _pyramid(base: NDArray) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         level = level.reshape(half, 2, half, 2, used).mean((1, 3))
 
 
-def _bordered(square: NDArray) -> NDArray:
+def bordered(square: NDArray) -> NDArray:
     """One texel added all around: over an edge of the octahedral square the sphere goes on mirrored along that edge."""
     size = len(square)
     result = np.empty((size + 2, size + 2, square.shape[-1]))

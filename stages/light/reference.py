@@ -5,8 +5,10 @@ shadow ray are evaluated and summed. Nothing is sampled, split, filtered or shar
 and is looked up once.
 
 `reference_light_maps` does the same for Blender's light maps and their bounce: a cell in which the surface stands shows what
-that point of it reflects, by the same sum.
+that point of it reflects, by the same sum. `reference_radiance` does it for any material and any number of bounces.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 import torch
@@ -129,6 +131,101 @@ def _shown(
         there = surface_points(scene, hits, wi, hits.mask[None])
         result[hits.mask] = reference_light_maps(scene, there, environment, 1, np.arange(len(there.n)), bounce=False)
     return result
+
+
+MaterialAt = Callable[[GBuffer], NDArray]
+"""Albedo, roughness and metallic of points: (P, 5)."""
+
+AT_ONCE = 1 << 20
+"""Directions that are looked along together."""
+
+
+def reference_radiance(
+    scene: Scene, points: GBuffer, environment: Environment, subdivision: int, material: MaterialAt, bounces: int
+) -> NDArray[np.float64]:
+    """What all points of a view send to its camera, (P, 3), over paths that meet the object `bounces` times more at most.
+
+    Where the surface stands in the way, it shows the same of its own point, by a quadrature of half as many rows, of the light
+    halved likewise. Arguments as `reference_transport`; roughness 0 is a mirror alone.
+    """
+    height, width, _ = environment.radiance.shape
+    directions, row_angle = directions_of_texels(height * subdivision, width * subdivision)
+    wi, angle = directions.reshape(-1, 3), np.repeat(row_angle, width * subdivision)
+    values = material(points).astype(np.float64)
+    result = np.empty((len(points.n), 3))
+    for first in range(0, len(points.n), max(1, AT_ONCE // len(wi))):
+        rows = np.arange(first, min(first + max(1, AT_ONCE // len(wi)), len(points.n)))
+        result[rows] = _reflected(scene, points[rows], environment, wi, angle, values[rows], material, bounces)
+    return result
+
+
+def _reflected(
+    scene: Scene,
+    points: GBuffer,
+    environment: Environment,
+    wi: NDArray,
+    angle: NDArray,
+    values: NDArray,
+    material: MaterialAt,
+    bounces: int,
+) -> NDArray[np.float64]:
+    """`reference_radiance` of some points. Args: wi, angle: (D, 3), (D,). values: (P, 5)."""
+    n, wo = points.n.astype(np.float64), points.wo.astype(np.float64)
+    point, ray = np.nonzero(wi @ n.T > 0)[::-1]
+    order = np.lexsort((ray, point))
+    point, ray = point[order], ray[order]
+    shown = _radiance_along(scene, points, point, environment, wi[ray], material, bounces)
+    weight = brdf(n[point], wo[point], wi[ray], values[point]) * angle[ray, None]
+    result: NDArray[np.float64] = np.stack([np.bincount(point, weight[:, c] * shown[:, c], len(n)) for c in range(3)], 1)
+    mirrors = np.flatnonzero(values[:, 3] == 0)
+    if len(mirrors):
+        n_v = (n * wo).sum(-1)[mirrors, None]
+        along = 2 * n_v * n[mirrors] - wo[mirrors]
+        c, m = values[mirrors, :3], values[mirrors, 4:5]
+        f0 = F0 * (1 - m) + m * c
+        shown = _radiance_along(scene, points, mirrors, environment, along, material, bounces)
+        result[mirrors] += (f0 + (1 - f0) * (1 - n_v) ** 5) * shown
+    return result
+
+
+def _radiance_along(
+    scene: Scene, points: GBuffer, point: NDArray, environment: Environment, wi: NDArray, material: MaterialAt, bounces: int
+) -> NDArray[np.float64]:
+    """What comes along rays (R, 3) from points of these numbers (R,): the light, or what the surface there sends."""
+    ng, surface = points.ng[point].astype(np.float64), points.surface(point).astype(np.float64)
+    lifted = 1 - ((wi * ng).sum(-1) / GRAZING).clip(0, 1)[:, None]
+    origin = surface + lifted * (points.origin[point] - surface)
+    hits = scene.intersect(origin, wi)
+    result: NDArray[np.float64] = lookup(environment.radiance, wi) * ~(hits.mask | scene.occluded(origin, wi))[:, None]
+    if bounces and hits.mask.any():
+        there = surface_points(scene, hits, wi, hits.mask[None])
+        result[hits.mask] = reference_radiance(scene, there, halved(environment), 1, material, bounces - 1)
+    return result
+
+
+def halved(environment: Environment) -> Environment:
+    """At half as many rows and columns."""
+    height, width, _ = environment.radiance.shape
+    if height < 8:
+        return environment
+    mean = environment.radiance.reshape(height // 2, 2, width // 2, 2, 3).mean((1, 3), np.float64)
+    return Environment(environment.name, mean.astype(np.float32))
+
+
+def brdf(n: NDArray, wo: NDArray, wi: NDArray, values: NDArray) -> NDArray[np.float64]:
+    """glTF's BRDF times N·L, without the mirror of roughness 0. Args: (R, 3) each; values: (R, 5). Returns: (R, 3)."""
+    c, r, m = values[:, :3], values[:, 3], values[:, 4:5]
+    n_l, n_v = (n * wi).sum(-1), (n * wo).sum(-1)
+    wm = wi + wo
+    wm = wm / np.linalg.norm(wm, axis=-1, keepdims=True)
+    s = (1 - (wm * wo).sum(-1)) ** 5
+    a2 = np.where(r > 0, alpha_from_roughness(r) ** 2, 1.0)
+    D = a2 / (np.pi * ((np.cross(wm, n) ** 2).sum(-1) + a2 * (wm * n).sum(-1) ** 2) ** 2)
+    lambda_o, lambda_i = (0.5 * (np.sqrt(1 + a2 * (1 - x**2) / x**2) - 1) for x in (n_v, n_l))
+    gloss = np.where(r > 0, D / (1 + lambda_o + lambda_i) / (4 * n_v), 0.0)[:, None]
+    diffuse = ((1 - F0) * (1 - s) * n_l / np.pi)[:, None]
+    s = s[:, None]
+    return (1 - m) * c * diffuse + ((F0 * (1 - m) + m * c) * (1 - s) + s) * gloss
 
 
 def _principled(n: NDArray, wo: NDArray, wi: NDArray, roughness: float) -> tuple[NDArray, NDArray, NDArray]:

@@ -106,6 +106,16 @@ class Scene:
         barycentric = np.stack([1 - u - v, u, v], -1).astype(np.float32)
         return Hits(mask, np.where(mask, hit["tfar"], 0).astype(np.float32), hit["primID"], barycentric)
 
+    def ends(self, origins: NDArray, directions: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        """What is nearest along rays that `occluded` says are blocked. Args: (R, 3) each.
+
+        Returns:
+            (R,) its triangle, -1 for nothing, -2 for a caster; (R, 3) barycentric.
+        """
+        hit = self._any.run(origins, directions, query="INTERSECT", output=True)
+        triangle = np.where(hit["primID"] < len(self.triangles), hit["primID"], -2).astype(np.int32)
+        return triangle, np.stack([1 - hit["u"] - hit["v"], hit["u"], hit["v"]], -1).astype(np.float32)
+
     def occluded(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
         """Whether anything, casters too, lies along each ray, at any distance. Args: (R, 3) each."""
         return self._any.run(origins, directions, query="OCCLUDED") >= 0

@@ -43,6 +43,8 @@ from stages.core.frames import tangent_frame
 from stages.core.knots import KNOTS
 from stages.core.parallel import cores
 from stages.light import highlights, reconstruction
+from stages.light.cells import Cells
+from stages.light.ends import Ends, find_ends
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
@@ -122,19 +124,21 @@ AIM = np.array([alpha_from_roughness(r) for r in (0.33, 1.0)], np.float32)
 class Sums:
     """What a point gathers, for all environments: (P, stored, CHANNELS) float32, and the variance of each.
 
-    rays: (P, lights) float32, traced for a point under a light, as a multiple of what every point begins with.
+    rays: (P, lights) float32, traced for a point under a light, as a multiple of what every point begins with. ends: where
+    the first round's blocked rays end, if that was asked for.
     """
 
     mean: NDArray[np.float32]
     variance: NDArray[np.float32]
     rays: NDArray[np.float32]
+    ends: Ends | None = None
 
     def of_lights(self, count: int) -> "Sums":
         """Without the channels that no light uses: averaging takes as long as there are channels."""
         if count == MAX_LIGHTS:
             return self
         mean, noise = (np.ascontiguousarray(values[:, :, : 3 * count]) for values in (self.mean, self.variance))
-        return Sums(mean, noise, self.rays)
+        return Sums(mean, noise, self.rays, self.ends)
 
 
 def light_transport(
@@ -164,13 +168,20 @@ def cached_light_set(environments: tuple[Environment, ...]) -> LightSet:
 
 def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int) -> list["Transport"]:
     """`light_transport` for lights that are already split."""
+    return integrate_with_ends(scene, points, lights, quality, seed)[0]
+
+
+def integrate_with_ends(
+    scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int, cells: Cells | None = None
+) -> tuple[list[Transport], Ends | None]:
+    """`integrate`, and where the points' blocked rays end, if the surface is given in cells."""
     near = reconstruction.Neighbours.of(points)
-    sums = gather(scene, points, lights, quality, seed, near).of_lights(len(lights.environments))
+    sums = gather(scene, points, lights, quality, seed, near, cells=cells).of_lights(len(lights.environments))
     mean = smoothed(sums, points, lights, near) if quality.smooth else sums.mean
     import torch  # here, for who only asks for what a known material reflects has no tensors
 
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
-    return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))]
+    return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))], sums.ends
 
 
 def _transport(sums: NDArray, cosine: "Tensor") -> "Transport":
@@ -190,9 +201,10 @@ def gather(
     seed: int,
     near: reconstruction.Neighbours,
     terms: Terms = GLTF,
+    cells: Cells | None = None,
 ) -> Sums:
     """The sums of every point, with further rays where they are noisiest."""
-    sums = trace(scene, points, lights, quality, seed, terms)
+    sums = trace(scene, points, lights, quality, seed, terms, cells=cells)
     for i, more in enumerate(EXTRA if quality.extra else (), 1):
         wanted = noisiest(sums, near, lights, terms, more)
         rows = np.flatnonzero(wanted.any(1))
@@ -246,8 +258,13 @@ def trace(
     seed: int,
     terms: Terms = GLTF,
     wanted: NDArray[np.bool_] | None = None,
+    cells: Cells | None = None,
 ) -> Sums:
-    """The sums of every point by Monte Carlo, each on its own. Args: wanted: (P, lights), the rest is of no use; or all."""
+    """The sums of every point by Monte Carlo, each on its own.
+
+    Args:
+        wanted: (P, lights), the rest is of no use; or all. cells: of the surface, where it is asked on which blocked rays end.
+    """
     count = len(points.n), len(lights.environments)
     wanted = np.ones(count, np.bool_) if wanted is None else wanted
     mean, gap = np.empty((2, len(points.n), terms.stored, CHANNELS), np.float32)
@@ -255,11 +272,13 @@ def trace(
     pixel, order = tiles(points.mask)
     with ThreadPoolExecutor(cores()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
-        list(pool.map(lambda part: _tile(scene, points, lights, terms, rays, pixel[part], part, wanted, mean, gap), parts))
+        given, sums = (scene, points, lights, terms, rays), (mean, gap)
+        found = list(pool.map(lambda part: _tile(*given, pixel[part], part, wanted, sums, cells), parts))
     if not wanted.all():
         gap[..., : 3 * count[1]] *= wanted.repeat(3, 1)[:, None]  # nor is its noise any to judge others by
     variance = reconstruction.variance(gap, reconstruction.Neighbours.of(points))
-    return Sums(mean, variance, np.ones(count, np.float32))
+    ends = None if cells is None else Ends.cat([Ends.none(0), *filter(None, found)])[np.argsort(order)]
+    return Sums(mean, variance, np.ones(count, np.float32), ends)
 
 
 def _tile(
@@ -271,10 +290,11 @@ def _tile(
     pixel: NDArray,
     part: NDArray,
     wanted: NDArray,
-    mean: NDArray,
-    gap: NDArray,
-) -> None:
-    """The sums of a tile's points, written to rows `part` of `mean` and `gap`."""
+    sums: tuple[NDArray, NDArray],
+    among: Cells | None,
+) -> Ends | None:
+    """The sums of a tile's points, written to rows `part` of both `sums`, mean and gap. Returns: where its blocked rays end."""
+    mean, gap = sums
     n, wo, cells = points.n[part], points.wo[part], lights.cells
     frame, alphas = (n, *tangent_frame(n)), terms.alphas(part)
     chosen, aimed = np.empty((2, len(part), len(cells.energy)), np.float32)
@@ -291,6 +311,16 @@ def _tile(
     weights = np.stack(terms.mirror_weights(cosine))
     for e, environment in enumerate(lights.environments):
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
+    return None if among is None else _ends(scene, among, rays, drawn, occluded)
+
+
+def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", occluded: NDArray[np.bool_]) -> Ends:
+    """Where the blocked rays of a tile's lobes and mirrors end."""
+    slots = np.flatnonzero(rays.slots[:, 0] < len(rays.counts))  # the mirror's is the last one
+    ray = drawn.row[:, slots]
+    point, slot = np.nonzero((ray >= 0) & occluded[ray])
+    ray = ray[point, slot]
+    return find_ends(scene, cells, len(drawn.row), point, slot == len(slots) - 1, drawn.origin[ray], drawn.direction[ray])
 
 
 OUTER = 0.1

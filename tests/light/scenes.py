@@ -36,13 +36,18 @@ def square(axis: int, offset: float, low: float, high: float) -> NDArray:
 
 def box_in_corner() -> Scene:
     """A box standing in the corner of a floor and two walls."""
-    quads = []
+    sides = []
     for axis in range(3):
-        quads.append(square(axis, -0.5, -0.5, 0.5))
-        quads.append(square(axis, -0.25, -0.25, 0.1)[::-1])
-        quads.append(square(axis, 0.1, -0.25, 0.1))
-    vertices = np.concatenate(quads)
-    base = 4 * np.arange(len(quads))[:, None]
+        sides.append(square(axis, -0.5, -0.5, 0.5))
+        sides.append(square(axis, -0.25, -0.25, 0.1)[::-1])
+        sides.append(square(axis, 0.1, -0.25, 0.1))
+    return quads(*sides)
+
+
+def quads(*corners: NDArray) -> Scene:
+    """Flat squares, (4, 3) each, which face where they wind counter-clockwise."""
+    vertices = np.concatenate(corners)
+    base = 4 * np.arange(len(corners))[:, None]
     triangles = np.concatenate([base + [0, 1, 2], base + [0, 2, 3]], 0)
     return Scene(vertices, triangles, flat_normals(vertices, triangles))
 

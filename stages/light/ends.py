@@ -1,0 +1,171 @@
+"""Where the blocked rays of a view's points end: what of the object each point sees, beside the light that it sees directly.
+
+Rays are those of the transport's lobes and of the mirror. One that is blocked tells the side of a cell (`stages.light.cells`)
+that it ends on, and where a mirror there would look: into the open, along a direction, or at another side. That is all that
+`stages.light.own_light` must know to say what comes along the ray, whatever the object is made of.
+
+Directions are kept in two 16-bit numbers on the octahedral square. Normal maps do not turn the mirrors that other points
+show, and what other objects of a scene block stays dark.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.core.parallel import compiled
+from stages.light.cells import Cells, part_of
+from stages.light.octahedral import direction_to_square
+from stages.light.scene import OFFSET, Scene
+
+OPEN, DARK = 65535, 65534
+"""In place of the number of a second side: the open, and another object."""
+
+STEPS = 65535
+"""Steps of a direction along each side of the octahedral square."""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Ends of the R blocked rays of P points, point after point, a point's mirror ray last.
+
+    start: (P + 1,) where a point's rays begin. mirror: (P,) whether its last one is its mirror's. side, second, third: (R,)
+    where a ray ends, where a mirror there looks, and where one there. towards, onward, beyond: (R, 2) direction of the ray, and
+    of those mirrors.
+    """
+
+    start: NDArray[np.int32]
+    mirror: NDArray[np.bool_]
+    side: NDArray[np.uint16]
+    second: NDArray[np.uint16]
+    third: NDArray[np.uint16]
+    towards: NDArray[np.uint16]
+    onward: NDArray[np.uint16]
+    beyond: NDArray[np.uint16]
+
+    @property
+    def rays(self) -> tuple[NDArray[np.uint16], ...]:
+        """All that is known of each ray."""
+        return self.side, self.second, self.third, self.towards, self.onward, self.beyond
+
+    def __getitem__(self, rows: NDArray[np.int64]) -> "Ends":
+        """Those of some points; -1 is the last."""
+        start = np.concatenate([[0], np.cumsum(np.diff(self.start)[rows])]).astype(np.int32)
+        ray = self.numbers(rows)
+        return Ends(start, self.mirror[rows], *(a[ray] for a in self.rays))
+
+    def numbers(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Which rays are those of some points, in their order."""
+        count = np.diff(self.start)[rows]
+        return np.arange(count.sum()) + (self.start[:-1][rows] - np.cumsum(count) + count).repeat(count)
+
+    @staticmethod
+    def cat(parts: Sequence["Ends"]) -> "Ends":
+        """Those of the points of all parts."""
+        before = np.cumsum([0, *(len(part.side) for part in parts[:-1])])
+        start = np.concatenate([[0], *(part.start[1:] + n for part, n in zip(parts, before, strict=True))])
+        rays = (np.concatenate(arrays) for arrays in zip(*(part.rays for part in parts), strict=True))
+        return Ends(start.astype(np.int32), np.concatenate([part.mirror for part in parts]), *rays)
+
+    @staticmethod
+    def none(points: int) -> "Ends":
+        """Of points that see nothing of the object."""
+        short, pair = np.zeros(0, np.uint16), np.zeros((0, 2), np.uint16)
+        return Ends(np.zeros(points + 1, np.int32), np.zeros(points, np.bool_), short, short, short, pair, pair, pair)
+
+
+def find_ends(
+    scene: Scene, cells: Cells, points: int, point: NDArray, mirror: NDArray, origin: NDArray, direction: NDArray
+) -> Ends:
+    """Follow some blocked rays, ordered by their points.
+
+    Args:
+        points: how many there are. point: (R,) number of each ray's, ascending. mirror: (R,) whether a ray is its point's
+        mirror ray, the last one then. origin, direction: (R, 3).
+    """
+    side, start, onward = _mirrored(scene, cells, origin, direction)
+    own = np.flatnonzero(side < DARK)
+    start, first = start[own], onward[own]
+    second, third = np.full((2, len(own)), OPEN, np.uint16)
+    second, start, onward = _mirrored(scene, cells, start, first)
+    again = np.flatnonzero(second < DARK)
+    third[again] = _mirrored(scene, cells, start[again], onward[again])[0]
+    count = np.bincount(point[own], minlength=points)
+    shown = np.zeros(len(count), np.bool_)
+    shown[point[own][mirror[own]]] = True
+    begins = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    directions = (on_steps(np.ascontiguousarray(d, np.float32)) for d in (direction[own], first, onward))
+    return Ends(begins, shown, side[own], second, third, *directions)
+
+
+def _mirrored(
+    scene: Scene, cells: Cells, origin: NDArray, direction: NDArray
+) -> tuple[NDArray[np.uint16], NDArray[np.float32], NDArray[np.float32]]:
+    """Where some rays end, and from where and whereto a mirror there looks: (R,), (R, 3), (R, 3). Args: (R, 3) each."""
+    triangle, barycentric = scene.ends(origin, direction)
+    side = np.where(triangle == -2, DARK, OPEN).astype(np.uint16)
+    start, onward = np.zeros((2, len(triangle), 3), np.float32)
+    mesh = (scene.vertices, scene.triangles, scene.normals)
+    towards = np.ascontiguousarray(direction, np.float32)
+    _reflect(mesh, (cells.first, cells.cuts), triangle, barycentric, towards, side, start, onward)
+    return side, start, onward
+
+
+@compiled
+def on_steps(directions):  # type: ignore[no-untyped-def]
+    """Directions as two whole numbers. Args: (R, 3). Returns: (R, 2)."""
+    result = np.empty((len(directions), 2), np.uint16)
+    for i in range(len(directions)):
+        u, v = direction_to_square(directions[i, 0], directions[i, 1], directions[i, 2])
+        result[i, 0], result[i, 1] = round(u * STEPS), round(v * STEPS)
+    return result
+
+
+@compiled(inline="always")
+def _face(vertices, triangles, f):  # type: ignore[no-untyped-def]
+    """Normal of a triangle by its winding, unit, and 0 for one without area."""
+    a, b, c = triangles[f, 0], triangles[f, 1], triangles[f, 2]
+    ux, uy, uz = vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1], vertices[b, 2] - vertices[a, 2]
+    vx, vy, vz = vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1], vertices[c, 2] - vertices[a, 2]
+    x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+    length = np.float32(np.sqrt(x * x + y * y + z * z))
+    scale = np.float32(1) / length if length > 0 else np.float32(0)
+    return x * scale, y * scale, z * scale
+
+
+@compiled
+def _reflect(mesh, cells, triangle, barycentric, direction, side, start, onward):  # type: ignore[no-untyped-def]
+    """What a ray ends on, and where a mirror there looks from and to; rays that end on nothing, -1 or -2, are left alone."""
+    vertices, triangles, normals = mesh
+    first, cuts = cells
+    for i in range(len(triangle)):
+        f = triangle[i]
+        if f < 0:
+            continue
+        b0, b1, b2 = barycentric[i, 0], barycentric[i, 1], barycentric[i, 2]
+        gx, gy, gz = _face(vertices, triangles, f)
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        behind = gx * dx + gy * dy + gz * dz > 0
+        side[i] = 2 * (first[f] + part_of(cuts[f], b0, b2)) + behind
+        turned = np.float32(-1) if behind else np.float32(1)
+        gx, gy, gz = gx * turned, gy * turned, gz * turned
+        nx = (b0 * normals[f, 0, 0] + b1 * normals[f, 1, 0] + b2 * normals[f, 2, 0]) * turned
+        ny = (b0 * normals[f, 0, 1] + b1 * normals[f, 1, 1] + b2 * normals[f, 2, 1]) * turned
+        nz = (b0 * normals[f, 0, 2] + b1 * normals[f, 1, 2] + b2 * normals[f, 2, 2]) * turned
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        if length > 1e-3 and nx * dx + ny * dy + nz * dz < 0:
+            nx, ny, nz = nx / length, ny / length, nz / length
+        else:
+            nx, ny, nz = gx, gy, gz
+        twice = 2 * (nx * dx + ny * dy + nz * dz)
+        rx, ry, rz = dx - twice * nx, dy - twice * ny, dz - twice * nz
+        if rx * gx + ry * gy + rz * gz <= 0:  # behind the face: what its own plane mirrors
+            twice = 2 * (gx * dx + gy * dy + gz * dz)
+            rx, ry, rz = dx - twice * gx, dy - twice * gy, dz - twice * gz
+        length = np.sqrt(rx * rx + ry * ry + rz * rz)
+        rx, ry, rz = rx / length, ry / length, rz / length
+        for d in range(3):
+            p = b0 * vertices[triangles[f, 0], d] + b1 * vertices[triangles[f, 1], d] + b2 * vertices[triangles[f, 2], d]
+            start[i, d] = p + np.float32(OFFSET) * (gx if d == 0 else gy if d == 1 else gz)
+        onward[i, 0], onward[i, 1], onward[i, 2] = rx, ry, rz

@@ -1,0 +1,142 @@
+"""Light between the sides of an object's cells: radiosity, for whatever material each side has.
+
+Each side knows its direct light under every environment, and where those of its rays end that are blocked. One bounce is one
+sparse product, of all environments at once: light = direct + what the rays bring, each by its weight.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from stages.core import albedo
+from stages.core.brdf import sample_cosine
+from stages.core.frames import tangent_frame
+from stages.core.parallel import compiled
+from stages.light.cells import Cells
+from stages.light.ends import STEPS, Ends
+from stages.light.environment import Environment
+from stages.light.gbuffer import GBuffer
+from stages.light.leaving import OwnLight, Sky, make_sky, received, reflectance
+from stages.light.light_set import MAX_LIGHTS
+from stages.light.scene import Scene
+from stages.light.terms import Terms, between_cosines
+from stages.light.transport import Quality, cached_light_set, trace
+from stages.light.transport_kernels import GOLDEN, on_square, weigh
+
+RAYS = Quality(64, 24, extra=False, smooth=False)
+"""Rays of a side of a cell."""
+
+SIDES = Terms(roughness=(1.0,), shares=(0.94, 0.06), stored=5, mirror=(1, 3), judged=(0,), sharp=())
+"""What is summed there: E, the first sum; the others, which the kernels know no way without, are left alone."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """What the S sides of an object's cells receive under L environments, before any material is known.
+
+    direct: (S, L, 3), direct light, 1 where all around is 1. ends: of the sides' rays. weight: (K,) share of each in all that
+    its side receives. sky: of the environments.
+    """
+
+    direct: NDArray[np.float32]
+    ends: Ends
+    weight: NDArray[np.float32]
+    sky: Sky
+
+    def solved(self, material: NDArray[np.float32], bounces: int) -> OwnLight:
+        """What the sides receive with a material each, of paths that meet the object up to `bounces` times before they reach a
+        point. Args: material: (S, 5) albedo, roughness, metallic."""
+        direct = np.ascontiguousarray(self.direct.reshape(len(self.direct), -1))
+        dark = np.zeros_like(direct)
+        own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark)
+        reflected = np.tile(reflectance(material), direct.shape[1] // 3)
+        for _ in range(bounces - 1):
+            light = direct + received(self.ends, self.weight, own, self.sky)
+            own = OwnLight(own.bounces + 1, own.material, light, own.light, reflected * own.before)
+        return own
+
+
+def make_exchange(scene: Scene, cells: Cells, environments: list[Environment], seed: int) -> Exchange:
+    """Trace what the sides of the cells receive directly, and where their blocked rays end.
+
+    Sides that nobody sees, as the inner ones of what is closed, are left dark: only those are traced that lie open or on which
+    rays of others end.
+    """
+    points = cells.sides(scene)
+    light = np.zeros((len(points.n), 3 * len(environments)), np.float32)
+    place, ends, weights = np.full(len(points.n), -1, np.int64), [], []
+    new = np.flatnonzero(open_sides(scene, points))
+    while len(new):
+        some = points[new]
+        light[new], found, weight = _traced(scene, some, cells, environments, seed)
+        place[new] = (place >= 0).sum() + np.arange(len(new))
+        ends.append(found)
+        weights.append(weight)
+        seen = np.zeros(1 << 16, np.bool_)
+        seen[np.concatenate([found.side, found.second, found.third])] = True
+        new = np.flatnonzero(seen[: len(place)] & (place < 0))
+    together = Ends.cat([*ends, Ends.none(1)])  # the last one stands for all that are not traced
+    every = np.concatenate([*weights, np.zeros(0, np.float32)])
+    return Exchange(light.reshape(len(light), -1, 3), together[place], every[together.numbers(place)], make_sky(environments))
+
+
+PROBES = 8
+"""Rays by which a side is found to lie open."""
+
+
+def open_sides(scene: Scene, points: GBuffer) -> NDArray[np.bool_]:
+    """Of which sides a few rays, spread by the cosine, meet nothing."""
+    t, b = tangent_frame(points.n)
+    found = np.zeros(len(points.n), np.bool_)
+    for k in range(PROBES):
+        x, y, z = sample_cosine((k + 0.5) / PROBES, (k * GOLDEN) % 1)
+        left = np.flatnonzero(~found)
+        along = (x * t + y * b + z * points.n)[left]
+        found[left] = ~scene.occluded(points.surface(left), along)
+    return found
+
+
+def _traced(
+    scene: Scene, points: GBuffer, cells: Cells, environments: list[Environment], seed: int
+) -> tuple[NDArray[np.float32], Ends, NDArray[np.float32]]:
+    """Direct light of some sides (P, 3 L), where their blocked rays end, and the weight of each of these."""
+    direct, ends = [], Ends.none(0)
+    for first in range(0, len(environments), MAX_LIGHTS):
+        lights = cached_light_set(tuple(environments[first : first + MAX_LIGHTS]))
+        sums = trace(scene, points, lights, RAYS, seed, SIDES, cells=None if first else cells)
+        direct.append(sums.mean[:, 0, : 3 * len(lights.environments)])
+        ends = sums.ends or ends
+    cosine = (points.n * points.wo).sum(-1).astype(np.float64)
+    whole = between_cosines(albedo.diffuse_table()[:, None], cosine)  # what an even light gives
+    weight, counts = np.zeros(len(ends.side), np.float32), SIDES.counts(RAYS.lobe)
+    alphas = SIDES.alphas(np.arange(len(points.n)))
+    _shares(points.n, *tangent_frame(points.n), points.wo, ends.start, ends.mirror, ends.towards, alphas, counts, weight)
+    rows = np.repeat(np.arange(len(points.n)), np.diff(ends.start))
+    weight /= whole[rows, 0]
+    weight /= np.maximum(np.bincount(rows, weight, len(points.n)), 1)[rows]  # no side sees more than all around it
+    return np.concatenate(direct, 1) / whole, ends, weight
+
+
+@compiled
+def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight):  # type: ignore[no-untyped-def]
+    """What each end weighs in its point's E; a mirror's weighs nothing."""
+    f32 = np.float32
+    most = 1
+    for p in range(len(n)):
+        most = max(most, start[p + 1] - start[p])
+    dx, dy, dz = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
+    s5, sin2, cos2, tan2 = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
+    density, inverse, weights = np.empty(most, f32), np.empty(most, f32), np.empty(3 * most, f32)
+    for p in range(len(n)):
+        count = start[p + 1] - start[p]
+        if mirror[p]:
+            count -= 1
+        for i in range(count):
+            ray = start[p] + i
+            dx[i], dy[i], dz[i] = on_square(towards[ray, 0] * f32(1 / STEPS), towards[ray, 1] * f32(1 / STEPS))
+        w = weights[: 3 * count].reshape((3, count))
+        scratch = (s5, sin2, cos2, tan2)
+        weigh(n, t, b, wo, p, (dx, dy, dz), count, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
+        for i in range(count):
+            weight[start[p] + i] = w[0, i]

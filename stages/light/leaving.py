@@ -1,0 +1,233 @@
+"""What the sides of an object's cells send along rays, given their materials and what they receive.
+
+A side's matt part sends what it receives. Its gloss sends what a mirror there shows, the more so the smoother it is: the
+environment, blurred as the side is rough, or another side, of which the same is asked once more; the rougher it is, the more
+what the side receives takes that place. After two mirrors, a side sends alike to everywhere.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from stages.core import albedo
+from stages.core.parallel import compiled, in_parallel, slices
+from stages.core.shading import F0
+from stages.light.ends import DARK, OPEN, STEPS, Ends
+from stages.light.environment import Environment
+from stages.light.light_set import bordered
+from stages.light.octahedral import octahedral
+from stages.light.prefilter import blurred
+from stages.light.transport_kernels import on_square
+
+ROUGHNESS = (0.0, 0.25, 0.5, 0.75, 1.0)
+SIZES = (512, 64, 64, 32, 32)
+"""Levels of an environment as gloss shows it, and texels along each side of their octahedral squares."""
+
+ROWS = 64
+"""Rows of the environment that is blurred."""
+
+SOFT = 0.5
+"""Roughness under which gloss is not taken where a wide lobe sees it: its few rays would sparkle."""
+
+POINTS_PER_TASK = 1 << 11
+
+
+class Sky(NamedTuple):
+    """L environments, blurred by each of ROUGHNESS: texels (T, 3 L), level after level, each with a border of one texel; first
+    (levels,) where each begins."""
+
+    texels: NDArray[np.float32]
+    first: NDArray[np.int64]
+
+
+class OwnLight(NamedTuple):
+    """Sides of cells under L environments. bounces: that a path may have made. material: (S, 5) albedo, roughness, metallic.
+
+    light, before: (S, 3 L), what they receive, and that with one bounce less. sent: (S, 3 L), what they send with two less.
+    """
+
+    bounces: int
+    material: NDArray[np.float32]
+    light: NDArray[np.float32]
+    before: NDArray[np.float32]
+    sent: NDArray[np.float32]
+
+
+def make_sky(environments: Sequence[Environment]) -> Sky:
+    """The environments as gloss of an object shows them to the object itself."""
+    levels = [np.concatenate(images, -1) for images in zip(*in_parallel(_levels, environments), strict=True)]
+    flat = [bordered(level).reshape(-1, level.shape[-1]).astype(np.float32) for level in levels]
+    return Sky(np.concatenate(flat), np.cumsum([0, *map(len, flat[:-1])]))
+
+
+def _levels(environment: Environment) -> list[NDArray[np.float32]]:
+    roi = oiio.ROI(0, 2 * ROWS, 0, ROWS, 0, 1, 0, 3)
+    small = oiio.ImageBufAlgo.resize(oiio.ImageBuf(environment.radiance), filtername="box", roi=roi)
+    coarse = np.asarray(small.get_pixels(oiio.FLOAT), np.float32).reshape(ROWS, 2 * ROWS, 3)
+    rough = [blurred(coarse, r, ROWS // 2) for r in ROUGHNESS[1:]]
+    images = [environment.radiance, *rough]
+    return [octahedral(image, size, 2) for image, size in zip(images, SIZES, strict=True)]
+
+
+def arriving(ends: Ends, own: OwnLight, sky: Sky, part: slice) -> NDArray[np.float32]:
+    """What the blocked rays of some points bring them: (rays, 3 L)."""
+    result = np.empty((ends.start[part.stop] - ends.start[part.start], own.light.shape[1]), np.float32)
+    start = ends.start[part.start : part.stop + 1]
+    _arriving(start, ends.mirror[part], ends.rays, own, sky, (albedo.table(), albedo.diffuse_table()), result)
+    return result
+
+
+def mirrored(ends: Ends, own: OwnLight, sky: Sky, part: slice, least: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What the mirror rays of some points bring them, seen by lobes of several roughnesses: (points, M, 3 L), 0 without one.
+
+    Args: least: (points, M), roughness of each lobe.
+    """
+    result = np.zeros((*least.shape, own.light.shape[1]), np.float32)
+    start = ends.start[part.start : part.stop + 1]
+    _mirrored(start, ends.mirror[part], ends.rays, least, own, sky, (albedo.table(), albedo.diffuse_table()), result)
+    return result
+
+
+def received(ends: Ends, weight: NDArray[np.float32], own: OwnLight, sky: Sky) -> NDArray[np.float32]:
+    """What all rays of each of the points bring it, each of a weight: (P, 3 L). Args: weight: (R,)."""
+    points = len(ends.mirror)
+    result = np.zeros((points, own.light.shape[1]), np.float32)
+
+    def task(part: slice) -> None:
+        brought = arriving(ends, own, sky, part)
+        _weighted(ends.start[part.start : part.stop + 1], weight, brought, result[part])
+
+    in_parallel(task, slices(points, POINTS_PER_TASK))
+    return result
+
+
+def reflectance(material: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Share of an even light that materials (S, 5) reflect in all: (S, 3)."""
+    c, r, m = material[:, :3], material[:, 3], material[:, 4:5]
+    weight = _cosine_weights()
+    over = (weight[None, :, None] * albedo.table()).sum(1)
+    a, b = (np.interp(r, np.linspace(0, 1, len(over)), over[:, k])[:, None] for k in (0, 1))
+    matt = float((weight * albedo.diffuse_table()).sum())
+    return ((1 - m) * c * matt + (F0 * (1 - m) + m * c) * a + b).astype(np.float32)
+
+
+def _cosine_weights() -> NDArray[np.float64]:
+    """Of the columns of `core.albedo`: their shares of the integral of 2 cos d cos, by the trapezoidal rule."""
+    x = albedo.cosines()
+    x[0] = 0
+    step = np.diff(x)
+    weight = x * (np.append(step, 0) + np.append(0, step))
+    return weight / weight.sum()
+
+
+@compiled
+def _weighted(start, weight, brought, out):  # type: ignore[no-untyped-def]
+    for p in range(len(out)):
+        for ray in range(start[p], start[p + 1]):
+            for c in range(out.shape[1]):
+                out[p, c] += weight[ray] * brought[ray - start[0], c]
+
+
+@compiled(inline="always")
+def _between(table, x):  # type: ignore[no-untyped-def]
+    """A table over the cosines of `core.albedo`, linear. Args: x: square root of the cosine, in steps."""
+    column = min(int(x), len(table) - 2)
+    within = x - np.float32(column)
+    return table[column] * (np.float32(1) - within) + table[column + 1] * within
+
+
+@compiled(inline="always")
+def _look_up(sky, place, roughness, out):  # type: ignore[no-untyped-def]
+    """Radiance of all environments along a direction, blurred by a roughness. Args: place: of `Ends`, two whole numbers."""
+    f32 = np.float32
+    level = roughness * f32(len(ROUGHNESS) - 1)
+    low = min(int(level), len(ROUGHNESS) - 2)
+    out[:] = 0
+    for k in range(2):
+        share = level - f32(low) if k else f32(1) - (level - f32(low))
+        if share <= f32(0):
+            continue
+        size = SIZES[low + k]
+        x, y = f32(place[0]) * f32(size / STEPS) + f32(0.5), f32(place[1]) * f32(size / STEPS) + f32(0.5)
+        left, top = min(int(x), size), min(int(y), size)
+        x, y = x - f32(left), y - f32(top)
+        above = sky.first[low + k] + top * (size + 2) + left
+        below = above + size + 2
+        w00, w01 = share * (f32(1) - x) * (f32(1) - y), share * x * (f32(1) - y)
+        w10, w11 = share * (f32(1) - x) * y, share * x * y
+        for c in range(len(out)):
+            upper = w00 * sky.texels[above, c] + w01 * sky.texels[above + 1, c]
+            out[c] += upper + w10 * sky.texels[below, c] + w11 * sky.texels[below + 1, c]
+
+
+@compiled(inline="always")
+def _cosine(one, two):  # type: ignore[no-untyped-def]
+    """Cosine to the normal of the mirror that turns a direction into another; both of `Ends`."""
+    x, y, z = on_square(one[0] * np.float32(1 / STEPS), one[1] * np.float32(1 / STEPS))
+    u, v, w = on_square(two[0] * np.float32(1 / STEPS), two[1] * np.float32(1 / STEPS))
+    return np.sqrt(min(max((np.float32(1) - (x * u + y * v + z * w)) * np.float32(0.5), np.float32(0)), np.float32(1)))
+
+
+@compiled(inline="always")
+def _send(material, cosine, light, tables, out):  # type: ignore[no-untyped-def]
+    """What a side sends where its mirror shows `out`, which is overwritten. Args: light: (3 L,), what it receives."""
+    f32 = np.float32
+    table, diffuse = tables
+    r, m = material[3], material[4]
+    x = np.sqrt(cosine) * f32(len(diffuse) - 1)
+    row = r * f32(len(table) - 1)
+    low = min(int(row), len(table) - 2)
+    within = row - f32(low)
+    a = _between(table[low, :, 0], x) * (f32(1) - within) + _between(table[low + 1, :, 0], x) * within
+    b = _between(table[low, :, 1], x) * (f32(1) - within) + _between(table[low + 1, :, 1], x) * within
+    matt, wide = _between(diffuse, x) * (f32(1) - m), r * r
+    for c in range(len(out)):
+        gloss = (f32(F0) * (f32(1) - m) + m * material[c % 3]) * a + b
+        out[c] = matt * material[c % 3] * light[c] + gloss * (out[c] + wide * (light[c] - out[c]))
+
+
+@compiled(inline="always")
+def _rougher(roughness, other):  # type: ignore[no-untyped-def]
+    """Roughness of one lobe seen through another: the squares of their alphas add up."""
+    a, b = roughness * roughness, other * other
+    return min(np.sqrt(np.sqrt(a * a + b * b)), np.float32(1))
+
+
+@compiled
+def _along(ray, rays, lobe, least, own, sky, tables, shown):  # type: ignore[no-untyped-def]
+    """What comes along a ray, seen by a lobe of a roughness, written to `shown`. Args: least: roughness taken at least."""
+    side, second, third, towards, onward, beyond = rays
+    rough = _rougher(max(own.material[side[ray], 3], least), lobe)
+    if second[ray] == OPEN:
+        _look_up(sky, onward[ray], rough, shown)
+    elif second[ray] == DARK or own.bounces < 2:
+        shown[:] = 0
+    else:
+        there = second[ray]
+        if third[ray] == OPEN:
+            _look_up(sky, beyond[ray], _rougher(rough, own.material[there, 3]), shown)
+        elif third[ray] == DARK:
+            shown[:] = 0
+        else:
+            shown[:] = own.sent[third[ray]]
+        _send(own.material[there], _cosine(onward[ray], beyond[ray]), own.before[there], tables, shown)
+    _send(own.material[side[ray]], _cosine(towards[ray], onward[ray]), own.light[side[ray]], tables, shown)
+
+
+@compiled
+def _arriving(start, mirror, rays, own, sky, tables, out):  # type: ignore[no-untyped-def]
+    """`arriving`; start begins at the first of the rays that are wanted."""
+    for ray in range(start[0], start[-1]):
+        _along(ray, rays, np.float32(0), np.float32(SOFT), own, sky, tables, out[ray - start[0]])
+
+
+@compiled
+def _mirrored(start, mirror, rays, least, own, sky, tables, out):  # type: ignore[no-untyped-def]
+    """`mirrored`; start begins at the first of the points that are wanted."""
+    for p in range(len(mirror)):
+        if mirror[p]:
+            for k in range(least.shape[1]):
+                _along(start[p + 1] - 1, rays, least[p, k], np.float32(0), own, sky, tables, out[p, k])

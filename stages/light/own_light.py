@@ -1,0 +1,125 @@
+"""The light that an object throws on itself, for any material: what a view's points see of its cells, added to their transport.
+
+What a point receives from the object is linear in what its other points send out. Where its blocked rays end is known
+(`stages.light.ends`), and what the sides of cells send along them (`stages.light.leaving`), once the light between them is
+(`stages.light.exchange`). E, A and B of the point grow by what its rays bring, weighted as the transport weighs them; a lobe
+narrower than its few rays takes what the mirror shows. So the point's own albedo, metallic and roughness enter exactly.
+"""
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from stages.core.frames import tangent_frame
+from stages.core.parallel import compiled, in_parallel, slices
+from stages.core.shading import KNOTS, Transport
+from stages.light.ends import STEPS, Ends
+from stages.light.leaving import POINTS_PER_TASK, OwnLight, Sky, arriving, mirrored
+from stages.light.terms import GLTF, Terms
+from stages.light.transport_kernels import on_square, weigh
+
+NARROW, WIDE = 0.25, 0.5
+"""Roughness up to which a lobe takes what the mirror shows, and from which on what its rays bring."""
+
+
+def own_sums(
+    n: NDArray[np.float32],
+    wo: NDArray[np.float32],
+    ends: Ends,
+    own: OwnLight,
+    sky: Sky,
+    counts: NDArray[np.int64],
+    terms: Terms = GLTF,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What P points receive from the object, by the sums of `terms`, and its variance: (P, stored, 3 L) each.
+
+    Args:
+        n, wo: (P, 3) world. ends: of these points. counts: rays of each lobe, as they were traced.
+    """
+    points = len(n)
+    result, variance = np.zeros((2, points, terms.stored, own.light.shape[1]), np.float32)
+    frame = (n, *tangent_frame(n))
+    cosine = (n * wo).sum(-1).astype(np.float64).clip(0, 1)
+    where = np.array(terms.summed), np.array(terms.mirror)
+    mirrors = np.stack(terms.mirror_weights(cosine), 1).astype(np.float32)
+
+    narrow = int((terms.alphas(np.arange(points)) < WIDE**2).any(0).sum())
+
+    def task(part: slice) -> None:
+        rows = np.arange(part.start, part.stop)
+        some = tuple(np.ascontiguousarray(a[part]) for a in (*frame, wo))
+        opened = np.ascontiguousarray(terms.open_albedo(cosine[part], rows), np.float32)
+        alphas = terms.alphas(rows)
+        least = np.concatenate([np.zeros((len(rows), 1), np.float32), np.sqrt(alphas)], 1)[:, : 1 + narrow]
+        rays = (ends.start[part.start : part.stop + 1], ends.mirror[part], ends.towards, arriving(ends, own, sky, part))
+        shown = (alphas, opened, mirrors[part], mirrored(ends, own, sky, part, least))
+        _gather(*some, rays, shown, counts, where, result[part], variance[part])
+
+    in_parallel(task, slices(points, POINTS_PER_TASK))
+    return result, variance
+
+
+def with_own_light(
+    transport: Transport, n: NDArray, wo: NDArray, ends: Ends, own: OwnLight, sky: Sky, counts: NDArray[np.int64]
+) -> Transport:
+    """Transport of P points, all L lights of a point after each other, with what the object itself adds."""
+    sums = own_sums(np.ascontiguousarray(n, np.float32), np.ascontiguousarray(wo, np.float32), ends, own, sky, counts)[0]
+    lights = sums.shape[2] // 3
+    rows = torch.from_numpy(sums).unflatten(2, (lights, 3)).movedim(2, 1).flatten(0, 1)  # (P L, stored, 3)
+    E, A, B = rows.to(transport.E.device).split([1, len(KNOTS), len(KNOTS)], 1)
+    return Transport(transport.E + E[:, 0], transport.A + A, transport.B + B, transport.cosine)
+
+
+@compiled
+def _gather(n, t, b, wo, rays, shown, counts, where, out, noise):  # type: ignore[no-untyped-def]
+    """`own_sums` of some points. rays: start, mirror and towards of `Ends`, what they bring. shown: alphas (P, K), open
+    albedo (P, 1 + 2 K), weights of the mirror, and what it shows to itself and to narrow lobes."""
+    f32 = np.float32
+    start, mirror, towards, radiance = rays
+    alphas, opened, mirrors, reflected = shown
+    summed, mirrored = where
+    points, knots = alphas.shape
+    channels, terms, lobe_rays = out.shape[2], opened.shape[1], f32(counts.sum())
+    most = 1
+    for p in range(points):
+        most = max(most, start[p + 1] - start[p])
+    dx, dy, dz = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
+    s5, sin2, cos2, tan2 = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
+    density, inverse, weight = np.empty(most, f32), np.empty(most, f32), np.empty(terms * most, f32)
+    step = f32(1 / STEPS)
+    for p in range(points):
+        first, count = start[p], start[p + 1] - start[p]
+        lobes = count - (1 if mirror[p] else 0)
+        brings = radiance[first - start[0] :]
+        for i in range(lobes):
+            dx[i], dy[i], dz[i] = on_square(towards[first + i, 0] * step, towards[first + i, 1] * step)
+        if lobes:
+            w = weight[: terms * lobes].reshape((terms, lobes))
+            scratch = (s5, sin2, cos2, tan2)
+            weigh(n, t, b, wo, p, (dx, dy, dz), lobes, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
+            for j in range(terms):
+                wide = f32(1) if j == 0 else _wideness(alphas[p, (j - 1) % knots])
+                if wide <= 0:
+                    continue
+                for c in range(channels):
+                    total, squares = f32(0), f32(0)
+                    for i in range(lobes):
+                        brought = w[j, i] * brings[i, c]
+                        total += brought
+                        squares += brought * brought
+                    out[p, summed[j], c] = wide * total
+                    noise[p, summed[j], c] = max(squares - total * total / lobe_rays, f32(0)) * wide * wide
+        if mirror[p]:
+            for c in range(channels):
+                for j in range(2):
+                    out[p, mirrored[j], c] = mirrors[p, j] * reflected[p, 0, c]
+                for j in range(1, terms):
+                    narrow = f32(1) - _wideness(alphas[p, (j - 1) % knots])
+                    if narrow > 0:
+                        out[p, summed[j], c] += narrow * opened[p, j] * reflected[p, 1 + (j - 1) % knots, c]
+
+
+@compiled(inline="always")
+def _wideness(alpha):  # type: ignore[no-untyped-def]
+    """How far a lobe goes by its own rays, 0 to 1."""
+    return min(max((np.sqrt(alpha) - np.float32(NARROW)) * np.float32(1 / (WIDE - NARROW)), np.float32(0)), np.float32(1))

@@ -1,0 +1,207 @@
+"""Light that an object throws on itself, beside float64 recursion and where it breaks renderers."""
+
+import functools
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from stages.core.color import reinhard
+from stages.core.shading import KNOTS, Material, Transport, shade
+from stages.light.cells import MOST, Cells, part_of
+from stages.light.ends import Ends
+from stages.light.environment import Environment
+from stages.light.exchange import Exchange, make_exchange
+from stages.light.gbuffer import GBuffer
+from stages.light.leaving import OwnLight, reflectance
+from stages.light.own_light import with_own_light
+from stages.light.reference import reference_radiance
+from stages.light.scene import Scene
+from stages.light.terms import GLTF
+from stages.light.transport import QUALITY, cached_light_set, integrate, integrate_with_ends, trace
+from tests.light import scenes
+
+STANDARD = QUALITY["standard"]
+FEW = 800
+"""Cells of these small scenes."""
+
+WHITE, RED = (0.9, 0.9, 0.9, 0.9, 0.0), (0.8, 0.05, 0.05, 0.5, 0.0)
+GOLD, STEEL, MIRROR = (1.0, 0.77, 0.34, 0.5, 1.0), (0.56, 0.57, 0.58, 0.8, 1.0), (0.9, 0.9, 0.9, 0.0, 1.0)
+
+
+@functools.cache
+def corner() -> tuple[Scene, GBuffer, Environment, Cells, Exchange, Transport, Ends]:
+    """A box in a corner, seen by 32² pixels under a sky with a large lamp."""
+    scene, light = scenes.box_in_corner(), scenes.sunny_light(20.0, 16)
+    points, cells, lights = scenes.view_of(scene, 32), Cells.of(scene, FEW), cached_light_set((light,))
+    transports, ends = integrate_with_ends(scene, points, lights, STANDARD, 0, cells)
+    assert ends is not None
+    return scene, points, light, cells, make_exchange(scene, cells, [light], 0), transports[0], ends
+
+
+def everywhere(values: tuple[float, ...]) -> NDArray[np.float32]:
+    return np.array([values], np.float32)
+
+
+def lit(transport: Transport, points: GBuffer, ends: Ends, own: OwnLight, exchange: Exchange) -> Transport:
+    return with_own_light(transport, points.n, points.wo, ends, own, exchange.sky, GLTF.counts(STANDARD.lobe))
+
+
+def shaded(scene: Scene, points: GBuffer, light: Environment, values: tuple[float, ...], bounces: int) -> NDArray[np.float32]:
+    """Radiance (P, 3) of a scene of one material, of direct light and with the object's own."""
+    cells = Cells.of(scene, FEW)
+    transports, ends = integrate_with_ends(scene, points, cached_light_set((light,)), STANDARD, 0, cells)
+    exchange = make_exchange(scene, cells, [light], 0)
+    own = exchange.solved(everywhere(values).repeat(2 * len(cells), 0), bounces)
+    assert ends is not None
+    material = Material.of(torch.from_numpy(everywhere(values).repeat(len(points.n), 0)))
+    return np.stack([shade(t, material).numpy() for t in (transports[0], lit(transports[0], points, ends, own, exchange))])
+
+
+def percent(a: NDArray, b: NDArray) -> float:
+    """Tone-mapped root mean square difference."""
+    x, y = (reinhard(torch.from_numpy(np.asarray(v, np.float64))) for v in (a, b))
+    return 100 * float((x - y).square().mean().sqrt())
+
+
+@pytest.mark.parametrize(("values", "energy"), ((WHITE, 0.02), (RED, 0.02), (GOLD, 0.06), (STEEL, 0.06)))
+def test_one_bounce_is_that_of_the_quadrature(values: tuple[float, ...], energy: float) -> None:
+    """Four of five parts of the error that direct light has are gone, or what is left is under 1.2 %."""
+    scene, points, light, cells, exchange, transport, ends = corner()
+    pixels = np.arange(5, len(points.n), len(points.n) // 24)
+    own = exchange.solved(everywhere(values).repeat(2 * len(cells), 0), 1)
+    material = Material.of(torch.from_numpy(everywhere(values).repeat(len(points.n), 0)))
+    direct, found = (shade(t, material).numpy()[pixels] for t in (transport, lit(transport, points, ends, own, exchange)))
+    exact = reference_radiance(scene, points[pixels], light, 2, lambda p: everywhere(values).repeat(len(p.n), 0), 1)
+    assert percent(found, exact) < max(1.2, 0.2 * percent(direct, exact))
+    assert percent(direct, exact) > 1
+    assert found.mean() == pytest.approx(exact.mean(), rel=energy)
+
+
+def test_a_mirror_shows_the_object_as_it_is() -> None:
+    """Of the radiance that a mirror's ray brings from a matt red surface, the error is under 3 % of the light."""
+    scene, points, light, cells, exchange, transport, ends = corner()
+    sides = cells.sides(scene)
+    box = lambda p: np.where((p.point.max(1) < 0.1 + 1e-4)[:, None] & (p.point.min(1) > -0.26)[:, None], MIRROR, RED)  # noqa: E731
+    pixels = np.flatnonzero((box(points)[:, 4] == 1) & ends.mirror)[::7]
+    own = exchange.solved(box(sides).astype(np.float32), 1)
+    material = Material.of(torch.from_numpy(box(points).astype(np.float32)))
+    found = shade(lit(transport, points, ends, own, exchange), material).numpy()[pixels]
+    exact = reference_radiance(scene, points[pixels], light, 1, box, 1)
+    assert len(pixels) > 4
+    assert percent(found, exact) < 3
+
+
+def test_zero_bounces_are_direct_light_bit_for_bit() -> None:
+    """Asking where rays end changes no sum."""
+    scene, points, light, cells, *_ = corner()
+    lights = cached_light_set((light,))
+    with_ends, without = trace(scene, points, lights, STANDARD, 0, cells=cells), trace(scene, points, lights, STANDARD, 0)
+    assert (with_ends.mean == without.mean).all() and (with_ends.variance == without.variance).all()
+    assert torch.equal(integrate(scene, points, lights, STANDARD, 0)[0].A, corner()[5].A)
+
+
+def test_what_is_convex_has_no_ends() -> None:
+    """An open sphere sees nothing of itself, and sends nothing to itself."""
+    scene, light = scenes.sphere(3), scenes.even_light()
+    points, cells = scenes.view_of(scene, 24), Cells.of(scene, FEW)
+    _, ends = integrate_with_ends(scene, points, cached_light_set((light,)), STANDARD, 0, cells)
+    assert ends is not None and len(ends.side) == 0
+    assert make_exchange(scene, cells, [light], 0).weight.sum() < 0.01 * len(cells)
+
+
+def test_a_white_furnace_is_never_brighter_than_white() -> None:
+    """A corner of the whitest plaster, whose BRDF reflects 0.975 of an even light: every point sends nearly 1."""
+    scene = scenes.box_in_corner()
+    points = scenes.view_of(scene, 24)
+    _, full = shaded(scene, points, scenes.even_light(), (1.0, 1.0, 1.0, 1.0, 0.0), 12)
+    direct, _ = shaded(scene, points, scenes.even_light(), (1.0, 1.0, 1.0, 1.0, 0.0), 1)
+    assert direct.mean() < 0.85
+    assert 0.93 < full.mean() <= 1.0 and np.percentile(full, 99) < 1.12
+
+
+def test_a_black_corner_throws_nothing() -> None:
+    """Albedo 0 and the roughest gloss: under 4 % of white's light are added."""
+    scene = scenes.box_in_corner()
+    direct, full = shaded(scene, scenes.view_of(scene, 24), scenes.even_light(), (0.0, 0.0, 0.0, 1.0, 0.0), 4)
+    assert 0 <= (full - direct).mean() < 0.04 and np.isfinite(full).all()
+
+
+def test_parallel_mirrors_a_hair_apart_keep_their_energy() -> None:
+    """Two plates that face each other at a thousandth of their size: finite, and never brighter than the light."""
+    near, far = scenes.square(2, 0.0, -0.5, 0.5), scenes.square(2, 0.001, -0.5, 0.5)[::-1]
+    direct, full = shaded(scenes.quads(near, far), scenes.view_of(scenes.quads(near, far), 24), scenes.even_light(), MIRROR, 8)
+    assert np.isfinite(full).all() and full.max() < 1.02 and (full >= direct).all()
+
+
+def test_a_closed_box_with_a_slit_is_lit_through_it_alone() -> None:
+    """Inside of a box with a narrow slit: some light, all of it less than a hundredth of what is outside."""
+    sides = [scenes.square(axis, at, -0.5, 0.5)[:: (-1 if at > 0 else 1)] for axis in range(3) for at in (-0.5, 0.5)]
+    lid = sides[5].copy()
+    lid[:, 0] = np.where(lid[:, 0] > 0, 0.49, lid[:, 0])  # a hundredth of the lid is open
+    scene = scenes.quads(*sides[:5], lid)
+    cells = Cells.of(scene, FEW)
+    exchange = make_exchange(scene, cells, [scenes.even_light()], 0)
+    own = exchange.solved(everywhere((0.8, 0.8, 0.8, 0.9, 0.0)).repeat(2 * len(cells), 0), 8)
+    inner = own.light[0::2]
+    assert 0 < inner.mean() < 0.05 and np.isfinite(inner).all()
+
+
+def test_thin_walls_do_not_leak() -> None:
+    """A sheet lit from above: what stands under it sees its dark side, though both sides are one triangle."""
+    sheet, floor = scenes.square(2, 0.0, -0.5, 0.5), scenes.square(2, -0.1, -0.5, 0.5)
+    scene = scenes.quads(sheet, floor)
+    light = Environment("above", np.concatenate([np.ones((8, 64, 3)), np.zeros((24, 64, 3))]).astype(np.float32))
+    cells = Cells.of(scene, FEW)
+    exchange = make_exchange(scene, cells, [light], 0)
+    own = exchange.solved(everywhere(WHITE).repeat(2 * len(cells), 0), 1)
+    height = cells.sides(scene).point[:, 2]
+    above, under = own.light[0::2][height[0::2] > -0.05], own.light[1::2][height[1::2] > -0.05]
+    assert above.mean() == pytest.approx(0.5, abs=0.04) and under.max() < 1e-6
+
+
+def test_a_sun_in_a_cavity_does_not_sparkle() -> None:
+    """Three polished walls under a sun of one texel: they add no more to a matt point than three more suns, straight above."""
+    scene, light = scenes.box_in_corner(), scenes.single_texel_light()
+    points, cells = scenes.view_of(scene, 24), Cells.of(scene, FEW)
+    transports, ends = integrate_with_ends(scene, points, cached_light_set((light,)), STANDARD, 0, cells)
+    exchange = make_exchange(scene, cells, [light], 0)
+    own = exchange.solved(everywhere((0.9, 0.9, 0.9, 0.1, 1.0)).repeat(2 * len(cells), 0), 3)
+    assert ends is not None
+    added = lit(transports[0], points, ends, own, exchange).E - transports[0].E
+    sun = light.radiance.max() * np.pi / 32 * 2 * np.pi / 64 / np.pi
+    assert float(added.median()) > 0 and float(added.max()) < 3 * sun
+
+
+def test_coincident_faces_are_finite() -> None:
+    """A floor that is there twice, and once more turned over."""
+    floor = scenes.square(2, 0.0, -0.5, 0.5)
+    scene = scenes.quads(floor, floor, floor[::-1], scenes.square(0, -0.5, -0.5, 0.5))
+    direct, full = shaded(scene, scenes.view_of(scene, 24), scenes.even_light(), WHITE, 4)
+    assert np.isfinite(full).all() and full.max() < 1.1 and (full >= direct).all()
+
+
+def test_every_point_lies_in_its_cell() -> None:
+    """The point that stands for a cell is found in it, and there are no more cells than numbers for them."""
+    for scene in (scenes.box_in_corner(), scenes.sphere(4)):
+        cells = Cells.of(scene)
+        where = zip(cells.first[cells.triangle], cells.cuts[cells.triangle], cells.barycentric, strict=True)
+        own = [first + part_of(cuts, b[0], b[2]) for first, cuts, b in where]
+        assert own == list(range(len(cells))) and len(cells) <= MOST
+
+
+def test_a_material_reflects_no_more_than_all() -> None:
+    """White metal at most 1, white plaster what glTF's BRDF has: 1.04 where its gloss is a mirror."""
+    rows = np.array([(1, 1, 1, r, m) for r in (0, 0.3, 0.6, 1) for m in (0, 1)], np.float32)
+    found = reflectance(rows)
+    assert found.max() < 1.05 and found[rows[:, 4] == 1].max() < 1.001 and found[rows[:, 4] == 1].min() > 0.4
+
+
+def test_only_what_is_asked_is_interpolated() -> None:
+    """What is added is linear in the receiver's albedo and metallic: at the knots, E, A and B are what is stored."""
+    _, points, _, cells, exchange, transport, ends = corner()
+    own = exchange.solved(everywhere(RED).repeat(2 * len(cells), 0), 2)
+    full = lit(transport, points, ends, own, exchange)
+    assert full.A.shape == (len(points.n), len(KNOTS), 3)
+    assert bool((full.E >= transport.E).all() and (full.A >= transport.A).all() and (full.B >= transport.B).all())
