@@ -13,8 +13,8 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from stages.core import albedo
+from stages.core.knots import F0
 from stages.core.parallel import compiled, in_parallel, slices
-from stages.core.shading import F0
 from stages.light.ends import DARK, OPEN, STEPS, Ends
 from stages.light.environment import Environment
 from stages.light.light_set import bordered

@@ -6,17 +6,21 @@ What a point receives from the object is linear in what its other points send ou
 narrower than its few rays takes what the mirror shows. So the point's own albedo, metallic and roughness enter exactly.
 """
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from stages.core.frames import tangent_frame
+from stages.core.knots import KNOTS
 from stages.core.parallel import compiled, in_parallel, slices
-from stages.core.shading import KNOTS, Transport
 from stages.light.ends import STEPS, Ends
 from stages.light.leaving import POINTS_PER_TASK, OwnLight, Sky, arriving, mirrored
 from stages.light.terms import GLTF, Terms
 from stages.light.transport_kernels import on_square, weigh
+
+if TYPE_CHECKING:
+    from stages.core.shading import Transport
 
 NARROW, WIDE = 0.25, 0.5
 """Roughness up to which a lobe takes what the mirror shows, and from which on what its rays bring."""
@@ -60,9 +64,13 @@ def own_sums(
 
 
 def with_own_light(
-    transport: Transport, n: NDArray, wo: NDArray, ends: Ends, own: OwnLight, sky: Sky, counts: NDArray[np.int64]
-) -> Transport:
+    transport: "Transport", n: NDArray, wo: NDArray, ends: Ends, own: OwnLight, sky: Sky, counts: NDArray[np.int64]
+) -> "Transport":
     """Transport of P points, all L lights of a point after each other, with what the object itself adds."""
+    import torch
+
+    from stages.core.shading import Transport
+
     sums = own_sums(np.ascontiguousarray(n, np.float32), np.ascontiguousarray(wo, np.float32), ends, own, sky, counts)[0]
     lights = sums.shape[2] // 3
     rows = torch.from_numpy(sums).unflatten(2, (lights, 3)).movedim(2, 1).flatten(0, 1)  # (P L, stored, 3)

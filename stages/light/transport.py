@@ -173,7 +173,7 @@ def integrate(scene: Scene, points: GBuffer, lights: LightSet, quality: Quality,
 
 def integrate_with_ends(
     scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int, cells: Cells | None = None
-) -> tuple[list[Transport], Ends | None]:
+) -> "tuple[list[Transport], Ends | None]":
     """`integrate`, and where the points' blocked rays end, if the surface is given in cells."""
     near = reconstruction.Neighbours.of(points)
     sums = gather(scene, points, lights, quality, seed, near, cells=cells).of_lights(len(lights.environments))
