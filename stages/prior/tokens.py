@@ -1,4 +1,5 @@
-"""The words of a prompt as tokens: each phrase that a table knows, the longest first, and each word that none knows."""
+"""The words of a prompt as tokens: each phrase that a table knows, the longest first, and each word that none knows. Words that
+say nothing are in fillers.tsv, those that join phrases in joins.tsv."""
 
 import re
 import unicodedata
@@ -15,41 +16,7 @@ from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER,
 from stages.prior.sizes import TIMES
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF
 
-FILLER = words(
-    "a photo of, a photograph of, a render of, a rendering of, a picture of, an image of, a model of, highly detailed, "
-    "photo of, render of, rendering of, picture of, image of, model of, photo, render, "
-    "detailed texture, detailed, realistic, photorealistic, studio lighting, physically based, pbr, k, texture, material, "
-    "surface, front view, side view, back view, top view, overhead view, high quality, masterpiece, beautiful, made of, "
-    "made from, made out of, made in, carved from, carved out of, cut from, cut out of, hewn from, hewn out of, moulded from, "
-    "molded from, cast in, cast from, forged from, spun from, woven from, woven out of, knitted from, sculpted from, "
-    "turned from, blown from, "
-    "as though, as if, built of, built from, a, an, the, is, are, at, "
-    "its, some, all, from, entirely, looks like, made, of it, "
-    "texturing, finish, finished, print, pattern, patterned, style, both, each, that, which, it, bits of, pieces of, "
-    "layer of, many, thick, thin, around, along, growing, on it, all over, lies, lie, made up of, made entirely of, "
-    "everywhere, s, this, their, other, one, simple, nice, piece of, block of, part, piece, parts, half-timbered, out, "
-    "coat of, coats of, coating of, splash of, set of, pair of, sheet of, slab of, lump of, was, were, be, for, as, "
-    "tint, hue, tone, sheen, shine, glow, glowing, like, more, ware, grain, look, looking, effect, imitation, tones, shade of, "
-    "shades of, unpainted, untreated, unvarnished, uncoated, bare, raw, plain, solid, pure, real, genuine, only, just, "
-    "whatsoever, at all, should, should be, would, could, to be, i, d, id, want, please, make, give, left out, left outside, "
-    "hand-thrown, hand painted, handpainted, hand painted style, whole, overall, throughout, somehow, found, recovered, "
-    "within, "
-    "from within, still, freshly, fresh, cluster of, hand-painted, "
-    "handmade, hand-made, handcrafted, hand-carved, carved, stylized, stylised, low poly, lowpoly, high poly, "
-    "cartoon, game asset, game ready, game-ready, game engine, unreal engine, unity, octane render, octane, blender, "
-    "cycles render, vray, substance painter, substance, trending on artstation, artstation, best quality, ultra detailed, "
-    "hyper detailed, hyperrealistic, ultra realistic, intricate details, intricate, ornate, cinematic lighting, "
-    "soft lighting, natural lighting, ambient light, concept art, sci-fi, cyberpunk, steampunk, post-apocalyptic, fantasy, "
-    "medieval, victorian, art deco, art nouveau, mid-century, mid century, modern, industrial, rustic, shabby chic, gothic, "
-    "baroque, tileable, seamless, tiling, texture variation, roughness variation, color variation, variation, award winning, "
-    "professional, elegant, close up, close-up, macro, hd, uhd, dslr, raw photo, hdr, upright, woven, stitched, crushed, "
-    "crumpled, dented in, ripped, torn, frayed, "
-    "product shot, studio shot, game prop, movie prop, hard surface, luxury packaging, bluetooth, wireless, fluffy, "
-    "wildlife photography, product photography, food photography, macro photography, "
-    "photography, sharp focus, morning light, soft morning light, golden hour, dramatic lighting, volumetric lighting, "
-    "rim lighting, soft light, creeping, climbing, crawling, trailing, hanging, "
-    "wrinkled, down the sides, down the side, down the walls, down its sides, down, slats, slat"
-)
+FILLER = [word for row in rows("fillers.tsv") for word in words(row[0])]
 """Words that say nothing of a material."""
 
 ENDINGS = ("ware", "work", "works", "like", "grain", "toned", "look", "ette")
@@ -87,84 +54,13 @@ class Join(NamedTuple):
     beneath: bool = False
 
 
-def _joins(kind: str, text: str, beneath: bool = False) -> dict[str, Join]:
-    return {word: Join(kind, beneath) for word in words(text)}
-
-
 JOINS = {
-    **_joins("with", "with, plus, has, have, having, featuring, including, but with, complete with, held by, "
-             "held together by, held together with, reinforced with, secured with, secured by, fastened with, fixed with, "
-             "tied with, joined with, joined by, whose, where, while, after, "
-             "and whose, adorned with, decorated with, embellished with, fitted with, equipped with, accented with, "
-             "accented by, with accents of, as well as, along with, together with, set off by, set off with, "
-             "finished off with"),
-    **_joins("comma", "but"),
-    **_joins("and", "and"),
-    **_joins("paint", "painted in, painted with, lacquered in, lacquered with, enamelled in, enameled in, finished in, "
-             "finished with, sprayed in, sprayed with, powder-coated in, powder coated in, rendered in, glazed in, "
-             "glazed with, clothed in"),
-    **_joins("seat", "upholstered in, upholstered with, padded with, cushioned with"),
-    **_joins("cover", "covered in, covered with, covered by, coated in, coated with, overgrown with, overgrown by, "
-             "smothered in, "
-             "caked in, caked with, crusted in, crusted with, sheathed in, encased in, "
-             "under a layer of, dusted with, dusted in, encrusted with, topped by a layer of, clad in, "
-             "blanketed in, buried in, wrapped in, dipped in, plated in, plated with, draped in, drenched in, "
-             "covered over with"),
-    **_joins("partly", "partly covered in, partly covered with, partially covered in, partially covered with, stained with, "
-             "mixed with, splattered with, spattered with, splashed with, stained by, smeared with, mottled with, "
-             "patched with"),
-    **_joins("spots", "speckled with, freckled with, peppered with, dotted with, flecked with, spotted with, sprinkled with"),
-    **_joins("stud", "studded with, riveted with"), **_joins("inlay", "inlaid with, inlaid in, veined with, shot through with, "
-             "repaired with, repaired in, mended with, mended in, laced with"),
-    **_joins("swirl", "marbled with, swirled with, swirling with, swirled into, swirling into, swirling through, "
-             "swirled through"),
-    **_joins("edge", "edged with, trimmed with, trimmed in, edged in, bordered with, bordered by, framed in, framed by, "
-             "framed with"),
-    **_joins("rim", "rimmed with, rimmed in"), **_joins("cap", "capped with, capped in"),
-    **_joins("top", "topped with, topped by"),
-    **_joins("tip", "tipped with"), **_joins("line", "lined with, lined in"), **_joins("stripe", "striped with, striped in"),
-    **_joins("band", "banded with, bound in, hooped with, ringed with, banded in"), **_joins("streak", "streaked with"),
-    **_joins("check", "checkered with, chequered with"),
-    **_joins("peel", "peeling off, peeling from, peeling away from, flaking off, flaking from, chipping off, chipped off, "
-             "wearing off, "
-             "coming off, chipping away from, peeling over, flaking over, worn off, crumbling off, crumbling from, "
-             "crumbling away from, falling off, falling from, falling away from, coming away from, breaking off, cracking off, "
-             "rubbed off, rubbing off, scraped off, scratched off, flaking away from, worn away from, "
-             "fallen off, crumbled off, broken off, peeled off, flaked off, rubbed away from", beneath=True),
-    **_joins("show", "showing, showing through to, revealing, exposing, worn down to, worn away to, chipped down to, "
-        "chipped to, rubbed down to, "
-             "worn through to, that shows, that reveals, worn to reveal, chipped away to reveal, scraped down to, "
-             "worn to, sanded to, scoured to, ground to, rubbed to, stripped to, scraped to, peeling to reveal, "
-             "flaking to reveal, to reveal, "
-             "to expose, to show, to uncover, uncovering, baring, to bare, letting show, "
-             "peeled back to"),
-    **_joins("through", "showing through, shining through, visible through, peeking through, visible under, "
-             "visible beneath, shows through, peeks through, shines through, exposed under, "
-             "showing under, showing beneath", True),
-    **_joins("fade", "fading into, fading to, fades into, fades to, blending into, blending to, turning into, turning to, "
-             "turns into, turns to, becoming, becomes, "
-             "transitioning to, transitioning into, gradient to, "
-             "shading into, shading to, graduating to, ombre to, merging into, melting into, dissolving into, changing into"),
-    **_joins("on", "on, onto, atop, upon, across, out of, growing on, growing out of, growing from, emerging from, mounted on, "
-             "standing on, sitting on, resting on, lying on, painted on, painted onto, printed on, splashed on", True),
-             **_joins("over", "over, on top of, applied to, laid over", True),
-    **_joins("above", "above, over top", True), **_joins("below", "below, under, beneath, underneath", True),
-    **_joins("of", "of"), **_joins("to", "to"), **_joins("in", "in, into, set in, set into, embedded in"),
+    word: Join(kind, bool(beneath))
+    for kind, beneath, place, told in rows("joins.tsv") if place == "between" for word in words(told)
 }  # fmt: skip
 """Words between two phrases, and how these lie."""
 
-POSTFIX = {
-    word: kind for kind, text in (
-        ("cover", "covered, coated, clad, encrusted, crusted, caked, dusted, wrapped, bound, upholstered"),
-        ("partly", "stained, splattered, spattered, splashed, smeared, mottled, patched"),
-        ("edge", "trimmed, edged, bordered, framed, piped"), ("spots", "spotted, dotted, speckled, flecked"),
-        ("check", "checked, checkered"), ("rim", "rimmed"), ("cap", "capped"), ("tip", "tipped"), ("top", "topped"),
-        ("vein", "veined"), ("inlay", "inlaid"), ("stripe", "striped"), ("band", "banded"), ("line", "lined"),
-        ("sole", "soled"),
-        ("handle", "handled"), ("stud", "studded"), ("streak", "streaked"), ("all", "plated"), ("legs", "legged"),
-        ("bottom", "bottomed"),
-    ) for word in words(text)
-}  # fmt: skip
+POSTFIX = {word: kind for kind, _, place, told in rows("joins.tsv") if place == "after" for word in words(told)}
 """Words after what lies on the thing that follows ("moss-covered stone"), and how it does."""
 
 ASIDE = words("near, beside, beside the, next to, next to the, behind, behind the, in front of, in front of the, "
