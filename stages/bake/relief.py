@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from stages.bake.raster import Layout, Surface
 from stages.core.parallel import compiled, in_parallel, slices
 from stages.light.normal_maps import NormalMaps, frame
-from stages.material.relief import gentle
+from stages.material.relief import STEEPEST, gentle
 
 FAR = 4.0
 """A neighbouring texel farther off in space than this many of a texel's own steps lies beyond a fold of the chart."""
@@ -55,25 +55,34 @@ def relief_normals(
     def lean(rows: slice) -> None:
         on = surface.triangle[rows] >= 0
         if on.any():
-            points = surface[rows].where(on)
-            result[rows][on] = _lean(points, slope[rows][on], carry, normals, frames, own)
+            points, leaning = surface[rows].where(on), np.empty((int(on.sum()), 3), np.float32)
+            added = np.zeros((0, 3)) if own is None else own_gradient(points, normals, own)
+            _lean(points.triangle, points.barycentric, slope[rows][on], carry, normals, frames.tangents, added, leaning)
+            result[rows][on] = leaning
 
     in_parallel(lean, slices(len(height), max(1, TOGETHER // len(height))))
     return result
 
 
-def _lean(
+def own_gradient(points: Surface, normals: NDArray, own: NormalMaps) -> NDArray[np.float64]:
+    """What the mesh's own normal maps add to the gradient of surface points, (N, 3)."""
+    n = points.interpolate(normals)
+    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+    weights = np.c_[points.barycentric, 1 - points.barycentric.sum(1)]
+    leaning = own.leaning(n, points.triangle, weights)
+    return (n - leaning / (leaning * n).sum(1, keepdims=True)).astype(np.float64)
+
+
+def lean_reference(
     points: Surface, slope: NDArray, carry: NDArray, normals: NDArray, frames: NormalMaps, own: NormalMaps | None
 ) -> NDArray[np.float32]:
-    """Tangent-space normals (N, 3) of surface points with a slope (N, 2) in world units a texel."""
+    """Tangent-space normals (N, 3) of surface points with a slope (N, 2) in world units a texel; `_lean` is its fast form."""
     n = points.interpolate(normals)
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
     gradient = np.einsum("nij,nj->ni", carry[points.triangle], slope)
     gradient = gentle(gradient - (gradient * n).sum(1, keepdims=True) * n)
     if own is not None:
-        weights = np.c_[points.barycentric, 1 - points.barycentric.sum(1)]
-        leaning = own.leaning(n, points.triangle, weights)
-        gradient += n - leaning / (leaning * n).sum(1, keepdims=True)
+        gradient += own_gradient(points, normals, own)
     t, b = frame(n, points.interpolate(frames.tangents))
     return in_frame(n - gradient, t, b, n)
 
@@ -148,3 +157,48 @@ def _at(corners, f, barycentric, d):  # type: ignore[no-untyped-def]
     """Coordinate d of a point of triangle f."""
     u, v = barycentric[0], barycentric[1]
     return u * corners[f, 0, d] + v * corners[f, 1, d] + (1 - u - v) * corners[f, 2, d]
+
+
+@compiled
+def _lean(triangle, barycentric, slope, carry, normals, tangents, added, result):  # type: ignore[no-untyped-def]
+    """`lean_reference`. added: (N, 3) of `own_gradient`, or (0, 3). result: (N, 3), written."""
+    n, t, b, m = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    for i in range(len(triangle)):
+        f, along = triangle[i], 0.0
+        for d in range(3):
+            n[d], t[d] = _at(normals, f, barycentric[i], d), _at(tangents, f, barycentric[i], d)
+        _to_unit(n, 1e-12)
+        for d in range(3):
+            m[d] = carry[f, d, 0] * slope[i, 0] + carry[f, d, 1] * slope[i, 1]
+            along += m[d] * n[d]
+        for d in range(3):
+            m[d] -= along * n[d]
+        length = np.sqrt(m[0] ** 2 + m[1] ** 2 + m[2] ** 2)
+        share = min(1.0, STEEPEST / max(length, STEEPEST / 2))
+        for d in range(3):
+            m[d] = n[d] - share * m[d] - (added[i, d] if len(added) else 0.0)
+        _to_unit(t, 1e-6)
+        for d in range(3):
+            b[d] = n[(d + 1) % 3] * t[(d + 2) % 3] - n[(d + 2) % 3] * t[(d + 1) % 3]
+        _to_unit(b, 1e-6)
+        _in_frame(m, t, b, n, -1.0 if _at(tangents, f, barycentric[i], 3) < 0 else 1.0, result[i])
+
+
+@compiled
+def _in_frame(m, t, b, n, sign, result):  # type: ignore[no-untyped-def]
+    """`in_frame` of one vector. sign: of the bitangent."""
+    lean, along, across, up = 0.0, 0.0, 0.0, 0.0
+    for d in range(3):
+        lean, along, across, up = lean + t[d] * n[d], along + m[d] * t[d], across + m[d] * b[d] * sign, up + m[d] * n[d]
+    squared = 1 - lean**2
+    x, z = (along - lean * up) / squared, (up - lean * along) / squared
+    length = np.sqrt(x * x + across * across + z * z)
+    result[0], result[1], result[2] = x / length, across / length, z / length
+
+
+@compiled
+def _to_unit(vector, least):  # type: ignore[no-untyped-def]
+    """Make a vector (3,) unit, in place, or 0 where it is no longer than `least`."""
+    length = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    for d in range(3):
+        vector[d] = vector[d] / length if length > least else 0.0

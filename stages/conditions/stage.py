@@ -104,9 +104,6 @@ def conditions(
             save_environment(out / "environments" / f"{light.name}.exr", light)
         scene = traced_scene(mesh)
         label = labels(mesh)
-        if whole:
-            survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.hidden, label)
-            save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
         smooth = scene.shaded_smooth() if options.profile == SD else None
         subject = Subject(scene, smooth, label, shared_texels(mesh))
         quality, expected = QUALITY[options.quality], None
@@ -117,7 +114,7 @@ def conditions(
         missing = [view for view in mine if not view_is_there(out, view, names, options)]
         made = len(missing)
         with ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
-            written = None
+            written = writer.submit(save_survey, out, scene, label, request) if whole else None
             for i, view in enumerate(missing):
                 progress("views", len(mine) - made + i, len(mine))
                 traced = trace(view, subject, cameras, lights, quality, options)
@@ -190,6 +187,12 @@ def start_folder(out: Path, request: Provenance, force: bool) -> None:
             write_json(out / REQUEST, asked)
     except OSError as error:
         raise OutputError(f"{out}: cannot be written: {reason(error)}; give a folder that can") from error
+
+
+def save_survey(out: Path, scene: Scene, label: NDArray[np.int32], request: Provenance) -> None:
+    """Make and write survey.npz."""
+    survey = make_survey(scene.vertices, scene.triangles, scene.normals, scene.hidden, label)
+    save_npz(out / "survey.npz", SURVEY, survey.to_arrays(), request)
 
 
 def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: ConditionsOptions) -> None:

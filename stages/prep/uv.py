@@ -66,6 +66,11 @@ def coverage(points: NDArray, height: int, width: int) -> NDArray[np.int32]:
     Args:
         points: (F, 3, 2) in texels, row 0 at y = 0.
     """
+    return np.cumsum(changes(points, height, width)[:, :-1].astype(np.int32), axis=1, dtype=np.int32)
+
+
+def changes(points: NDArray, height: int, width: int) -> NDArray:
+    """By how much `coverage` changes at each texel from that on its left, (height, width + 1), whole numbers."""
     facing = np.sign(signed_area(points))
     start, end = points.reshape(-1, 2), np.roll(points, -1, 1).reshape(-1, 2)
     upward = (end[:, 1] > start[:, 1])[:, None]
@@ -78,8 +83,7 @@ def coverage(points: NDArray, height: int, width: int) -> NDArray[np.int32]:
     x = low[edge, 0] + (row + 0.5 - low[edge, 1]) * slope[edge]
     column = np.clip(np.ceil(x - 0.5), 0, width).astype(np.int64)
     step = np.where(upward[:, 0], -1.0, 1.0)[edge] * np.repeat(facing, 3)[edge]
-    change = np.bincount(row * (width + 1) + column, step, height * (width + 1)).reshape(height, width + 1)
-    return np.cumsum(change[:, :-1].astype(np.int32), axis=1, dtype=np.int32)
+    return np.bincount(row * (width + 1) + column, step, height * (width + 1)).reshape(height, width + 1)
 
 
 def uv_charts(triangles: NDArray, uv: NDArray) -> NDArray[np.int32]:

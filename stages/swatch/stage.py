@@ -20,7 +20,7 @@ from stages.core.artifact import (
     write_manifest,
 )
 from stages.core.images import write_png
-from stages.core.parallel import beside, cores
+from stages.core.parallel import beside, cores, in_parallel, slices
 from stages.core.progress import Progress, silent
 from stages.material.directions import WHOLE
 from stages.material.library import Library, hashes
@@ -37,6 +37,9 @@ from stages.swatch.render import preview
 
 SWATCH = Schema("dreammat.swatch", 1, manifest="swatch.json")
 """A folder: albedo, roughness, metallic, normal, height as .exr and .png, orm.png; preview.png; swatch.json."""
+
+BAND = 64
+"""Rows that one task leans."""
 
 SETTLED_AT = 128
 """Points along an edge of the square on which masks are settled."""
@@ -100,12 +103,17 @@ def tile(recipe: Recipe, size: int) -> Maps:
 
 def tile_normals(height: NDArray[np.float32]) -> NDArray[np.float32]:
     """Tangent-space normals of a tile's height, +Y up. Args: (H, H) edges of the tile. Returns: (H, H, 3) unit."""
-    size = np.float32(len(height))
-    right = (np.roll(height, -1, 1) - np.roll(height, 1, 1)) * (size / 2)
-    up = (np.roll(height, 1, 0) - np.roll(height, -1, 0)) * (size / 2)
-    right, up = np.moveaxis(gentle(np.stack([right, up], -1)), -1, 0)
-    normal = np.stack([-right, -up, np.ones_like(height)], -1)
-    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    size, normal = np.float32(len(height)), np.ones((*height.shape, 3), np.float32)
+    above, below = np.roll(height, 1, 0), np.roll(height, -1, 0)
+
+    def lean(rows: slice) -> None:
+        right = (np.roll(height[rows], -1, 1) - np.roll(height[rows], 1, 1)) * (size / 2)
+        up = (above[rows] - below[rows]) * (size / 2)
+        normal[rows, :, :2] = -gentle(np.stack([right, up], -1))
+        normal[rows] /= np.linalg.norm(normal[rows], axis=-1, keepdims=True)
+
+    in_parallel(lean, slices(len(height), BAND))
+    return normal
 
 
 def write_maps(out: Path, maps: Maps) -> list[str]:

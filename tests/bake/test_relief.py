@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 
 from stages.asset.maps import Maps
-from stages.asset.traced import baked_bumps
+from stages.asset.traced import baked_bumps, world_frames
+from stages.bake.relief import _lean, lean_reference, own_gradient
 from stages.bake.stage import Subject, with_normals
 from stages.core.artifact import Artifact, load_npz
 from stages.core.schemas import PREP
@@ -141,6 +142,21 @@ def test_flat_stays_flat_and_padding_is_filled(tmp_path: Path) -> None:
     np.testing.assert_array_equal(maps.normal, np.broadcast_to([0, 0, 1], (SIZE, SIZE, 3)))
     assert with_normals(subject, Maps(material)).normal is None
     assert (np.abs(np.linalg.norm(baked(subject).normal, axis=-1) - 1) < 1e-5).all()
+
+
+@pytest.mark.parametrize("with_own", [False, True])
+def test_texels_lean_as_the_reference_says(tmp_path: Path, with_own: bool) -> None:
+    subject, rng = subject_of(tmp_path, "ball"), np.random.default_rng(0)
+    points, normals = subject.touched.where(subject.touched.triangle >= 0), subject.mesh["normals"]
+    carry, slope = rng.normal(size=(len(normals), 3, 2)), rng.normal(size=(len(points.triangle), 2)).astype("f4")
+    frames = world_frames(subject.mesh, {0})
+    own = replace(frames, maps=[NormalMap(np.array([[[-0.6, 0, 0.8]]], "f4"))]) if with_own else None
+    wanted = lean_reference(points, slope, carry, normals, frames, own)
+    added = own_gradient(points, normals, own) if own else np.zeros((0, 3))
+    found = np.empty_like(wanted)
+    _lean(points.triangle, points.barycentric, slope, carry, normals, frames.tangents, added, found)
+    assert (found[:, 2] < 0.9).mean() > 0.3
+    np.testing.assert_allclose(found, wanted, atol=2e-6)
 
 
 def test_relief_adds_to_the_normal_map_that_is_there(tmp_path: Path) -> None:
