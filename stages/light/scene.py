@@ -15,6 +15,7 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from stages.light import hit_kernels
 from stages.light.emission import Emission
 from stages.light.normal_maps import NormalMaps
 from stages.light.outermost import outermost
@@ -154,8 +155,9 @@ class Scene:
 
     def point(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
         """World position on each triangle. Args: (P,), (P, 3). Returns: (P, 3)."""
-        corners = self.vertices[self.triangles[triangle]].astype(np.float64)  # (P, 3, 3)
-        return np.einsum("pk,pkd->pd", barycentric, corners).astype(np.float32)
+        result = np.empty((len(triangle), 3), np.float32)
+        hit_kernels.points(self.vertices, self.triangles, triangle, barycentric, result)
+        return result
 
     def bumped(self, bumps: NormalMaps | None) -> "Scene":
         """The same mesh, and the same trees, with other normal maps."""
@@ -178,10 +180,9 @@ class Scene:
 
     def smooth_normal(self, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float32]:
         """Unit interpolated normal; the triangle's own where the corners' cancel out. Returns: (P, 3)."""
-        n = np.einsum("pk,pkd->pd", barycentric, self.normals[triangle].astype(np.float64))
-        length = np.linalg.norm(n, axis=-1, keepdims=True)
-        flat = self.geometric_normal(triangle)
-        return np.where(length > 1e-3, n / np.where(length > 1e-3, length, 1), flat).astype(np.float32)
+        result = np.empty((len(triangle), 3), np.float32)
+        hit_kernels.smooth_normals(self.normals, self._flat_normals, triangle, barycentric, result)
+        return result
 
     def ray_origin(self, triangle: NDArray, barycentric: NDArray, side: NDArray) -> NDArray[np.float32]:
         """Where rays that leave a surface point start: on the smooth surface that the normals describe, lifted off.
@@ -195,10 +196,7 @@ class Scene:
         Returns:
             (P, 3) float32.
         """
-        b = np.asarray(barycentric, np.float64)
-        corners = self.vertices[self.triangles[triangle]].astype(np.float64)  # (P, 3, 3)
-        normals = self.normals[triangle].astype(np.float64) * side[:, None, None]
-        p = np.einsum("pk,pkd->pd", b, corners)
-        below = np.minimum(np.einsum("pkd,pkd->pk", p[:, None] - corners, normals), 0.0)  # (P, 3)
-        smooth = p - np.einsum("pk,pk,pkd->pd", b, below, normals)
-        return (smooth + OFFSET * side[:, None] * self.geometric_normal(triangle)).astype(np.float32)
+        result, lifts = np.empty((len(triangle), 3), np.float32), np.stack([side, OFFSET * side], -1).astype(np.float64)
+        shape = (self.vertices, self.triangles, self.normals, self._flat_normals)
+        hit_kernels.origins(*shape, triangle, barycentric, lifts, result)
+        return result
