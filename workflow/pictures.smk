@@ -43,3 +43,7 @@ rule manifest:
     params: words=WORDS
     resources: mem_mb=2000, runtime=240
     shell: "{PICTURES} {params.words:q} 2> {log:q}"
+
+
+onstart:  # as in Snakefile
+    workflow.scheduler.job_rate_limiter = None

@@ -39,6 +39,9 @@ A_MESH = 2
 MESHES = 10
 """Most meshes there are."""
 
+MANY, ENGINE = 100, 0.1
+"""From so many jobs on, the engine may add this share of its commands' CPU time: with fewer its start counts."""
+
 TWICE = re.compile(r"^Finished jobid: \d+ \(Rule: (prep|conditions|distill|bake)\)", re.M)
 
 
@@ -66,15 +69,16 @@ def engine(jobs: Path, *words: str) -> list[str]:
     return [sys.executable, "-m", "snakemake", *where, "--directory", str(jobs.parent), *words, "--config", f"jobs={jobs}"]
 
 
-CLOCK = """import atexit, os, sys
-def write():
-    used = os.times()
-    with open({path!r}, "a") as file:
-        file.write(f"{{used.user + used.system + used.children_user + used.children_system}}\\n")
+CLOCK = """import os, sys
 if "dreammat_cli" in sys.orig_argv:
-    atexit.register(write)
+    command = os.fork()
+    if command:
+        _, status, used = os.wait4(command, 0)
+        with open({path!r}, "a") as file:
+            file.write(f"{{used.ru_utime + used.ru_stime}}\\n")
+        os._exit(os.waitstatus_to_exitcode(status))
 """
-"""A sitecustomize.py: each command that comes to its end notes its CPU seconds in a file."""
+"""A sitecustomize.py: of each command that comes to its end, all of its CPU seconds are noted in a file."""
 
 
 def environment(clock: Path | None = None) -> dict[str, str]:
@@ -189,6 +193,8 @@ def campaign(chosen: argparse.Namespace, folder: Path) -> None:
     print(f"{chosen.jobs} jobs done, the broken one failed alone; a changed prompt would redo distill and bake of its job")
     print(f"{len(due)} files of {chosen.jobs} jobs have the bytes that they have by hand")
     print(f"CPU: {whole:.0f} s, of which the commands {commands:.0f} s: the engine adds {whole / commands - 1:.1%}")
+    if chosen.jobs >= MANY:
+        assert whole < (1 + ENGINE) * commands, "the engine costs too much"
     print(f"done twice: {twice or 'nothing'}", flush=True)
     assert not twice
 
