@@ -665,39 +665,6 @@ def knit(at: Place, width: float, height: float, seed: int = 0) -> Loops:
     return Loops((back * (0.45 + 0.55 * slim)).astype(np.float32), across.astype(np.float32), a, ident, seen)
 
 
-def tufts(at: Place, row: float, stitch: float, seed: int = 0, lean: float = 0.5) -> Loops:
-    """Loops of a pile, stitched in rows up the surface (at.uv), each lapping over the next: no two as wide, as long or as
-    straight. row: from row to row, metres. stitch: along a row. lean: how far loops flop to either side, of their width."""
-    flat = at.flat
-    stray = np.float32(0.12 * row) * noise(flat, 5 * row, seed + 3)
-    (columns, wide), (stitches, up) = (_fitted(t, s, 1) for t, s in zip(at.period[:2], (row, stitch), strict=True))
-    u, v = (at.uv[0] + stray) / np.float32(wide), at.uv[1] / np.float32(up)
-    column, number = np.floor(u), seed_of(at, seed)
-    wrapped = column - columns * np.floor(column / columns) if columns else column
-    v = v + kernels.random_numbers(_hash(wrapped, at.face, number), 1)
-
-    def loop(step: Array) -> NDArray[np.uint32]:
-        k = step - stitches * np.floor(step / stitches) if stitches else step
-        return _hash(k + np.float32(7919) * wrapped, at.face, number)
-
-    step = np.floor(v)
-    begins = step + np.float32(0.5) * kernels.random_numbers(loop(step), 2)
-    before = v < begins
-    mine = np.where(before, step - 1, step)
-    start = np.where(before, step - 1 + np.float32(0.5) * kernels.random_numbers(loop(step - 1), 2), begins)
-    ends = mine + 1 + np.float32(0.5) * kernels.random_numbers(loop(mine + 1), 2)
-    ident, t = loop(mine), (v - start) / np.maximum(ends - start, 0.3)
-    bow = np.float32(lean) * (kernels.random_numbers(ident, 3) - np.float32(0.5))
-    half = np.float32(0.72) + np.float32(0.3) * kernels.random_numbers(ident, 4)
-    across = (2 * (u - column) - 1 - bow * (4 * t * (1 - t) - np.float32(0.4))) / half
-    back = np.sqrt(np.clip(1 - across * across, 0, 1))
-    arch = np.sqrt(np.clip(t * (1 - t) * 4, 0, 1)) * (np.float32(0.7) + np.float32(0.6) * t)
-    seen = fading(0.6 * min(row, stitch), at.footprint)
-    height = back * (np.float32(0.3) + np.float32(0.7) * np.minimum(arch, 1))
-    height, across, t = (a.astype(np.float32) for a in (height, np.clip(across, -1, 1), t))
-    return Loops(height, across, t, ident, seen)
-
-
 def laid(at: Place, width: float, lay: float, seed: int = 0) -> Loops:
     """Ropes side by side on the surface (at.uv), along its first axis. width: of a rope, metres. lay: from strand to strand."""
     x, row, _ = repeats(at, width, 1)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from stages.material.patterns import hexagons, knit, laid, marks, scales, strands, tufts, wickerwork
+from stages.material.patterns import hexagons, knit, laid, marks, scales, strands, wickerwork
 from stages.material.place import Place
 
 POINTS = 40_000
@@ -11,7 +11,6 @@ POINTS = 40_000
 PATTERNS = {
     "knit": lambda at: knit(at, 0.007, 0.005, 3),
     "laid": lambda at: laid(at, 0.014, 0.012, 3),
-    "tufts": lambda at: tufts(at, 0.005, 0.0066, 3),
     "wickerwork": lambda at: wickerwork(at, 0.02, 0.005, 3),
     "scales": lambda at: scales(at, 0.01, 0.006, 3),
     "hexagons": lambda at: hexagons(at, 0.006, 3),
@@ -44,7 +43,7 @@ def area_of_a_piece(ident: np.ndarray) -> float:
     return 0.09 / len(np.unique(ident))
 
 
-AREAS = {"knit": 0.0035 * 0.005, "tufts": 0.005 * 0.0066, "scales": 6e-5, "hexagons": 0.006**2 * 0.75**0.5}
+AREAS = {"knit": 0.0035 * 0.005, "scales": 6e-5, "hexagons": 0.006**2 * 0.75**0.5}
 
 
 @pytest.mark.parametrize(("name", "area"), AREAS.items())

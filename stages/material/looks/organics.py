@@ -4,7 +4,6 @@ import numpy as np
 
 from stages.material.look import Look, mix, palette, shade, tint
 from stages.material.patterns import (
-    PEBBLES,
     Spectrum,
     cells,
     cracks,
@@ -12,7 +11,6 @@ from stages.material.patterns import (
     exceeds,
     fading,
     fbm,
-    heap,
     hexagons,
     line,
     lost,
@@ -75,21 +73,19 @@ def bone(at: Place) -> Look:
 
 
 def horn(at: Place) -> Look:
-    """Cow horn, scraped and polished: honey that one sees into, long soft stripes along it, a dark cloud that thins out
-    through them, fine layers, scratches of the scraper."""
+    """Buffalo horn, polished: nearly black, with honey that one sees into where it thins, in bands that flow and part; fine
+    layers, scratches of the scraper."""
     flat = at.flat
-    bent = warped(flat, 0.003, 0.09, 1, 2)
-    stripes = Spectrum(0.018, 0.0008, 0.62, (1, 16, 1), 0.1, patch=0.4)
-    stripe = fbm(bent, stripes, 2)
-    cloud = fbm(bent, Spectrum(0.14, 0.03, 0.5, (1, 2, 1)), 3)
-    fibre = fbm(flat, Spectrum(0.0016, 0.00015, 1.1, (1, 8, 1), 0.4, -0.1, 0.4), 4)
-    scratch = marks(at, 0.03, 0.0002, 4, 1.5, 0.9, 5, 0.7, 0.1).cover
-    dark = threshold(cloud + 0.45 * stripe, 0.5, 1.0)
-    color = palette(0.5 + 0.15 * stripe + 0.14 * cloud, "#8f6430", "#bb8f55", "#d6b988", "#eadbb9")
-    color = mix(color, palette(0.45 + 0.2 * stripe, "#1a1310", "#33251b", "#5a412a"), 0.94 * dark)
-    color = tint(shade(color, 0.08 * fibre + 0.05 * stripe + 0.08 * scratch), 0.05 * cloud)
-    rough = 0.18 + 0.03 * fibre + 0.02 * stripe + 0.16 * scratch
-    return Look(color, np.clip(rough, 0.05, 1), 0.0, 3e-6 * fibre + 6e-6 * stripe - 4e-6 * scratch)
+    bent = warped(warped(flat, 0.010, 0.10, 1, 2), 0.002, 0.012, 6, 2)
+    band = fbm(bent, Spectrum(0.034, 0.004, 0.6, (1, 5, 1), 0.2, patch=0.3), 2)
+    fibre = fbm(bent, Spectrum(0.0024, 0.00015, 0.9, (1, 9, 1), 0.3, patch=0.5), 4)
+    cloud = fbm(bent, Spectrum(0.10, 0.02, 0.5, (1, 2, 1)), 3)
+    scratch = marks(at, 0.03, 0.00016, 4, 1.5, 0.9, 5, 0.7, 0.1).cover
+    glow = 0.39 + 0.20 * band + 0.13 * cloud + 0.025 * fibre
+    color = palette(glow, "#15100e", "#221813", "#4a3018", "#8f6430", "#c79a5c", "#ead6ae")
+    color = tint(shade(color, 0.07 * fibre + 0.10 * scratch), 0.04 * cloud)
+    rough = 0.14 + 0.02 * fibre + 0.12 * scratch
+    return Look(color, np.clip(rough, 0.05, 1), 0.0, 2e-6 * fibre + 5e-6 * band - 4e-6 * scratch)
 
 
 HAIRS = Spectrum(0.0014, 0.00012, 0.95, (1, 26, 1), 0.35, -0.1, 0.3)
@@ -125,63 +121,58 @@ def fur(at: Place) -> Look:
 
 
 def feathers(at: Place) -> Look:
-    """Plumage: rounded feathers in rows, a pale shaft, barbs slanting from it that part here and there, light rims."""
+    """Plumage: rounded feathers in rows, a thin pale shaft, barbs slanting from it that part here and there, dark bars that
+    follow the barbs, soft edges over the shadow that they throw."""
     flat = at.flat
-    bent = warped(flat, 0.0035, 0.06, 1, 2)
+    bent = warped(flat, 0.0026, 0.05, 1, 2)
+    wobble = fbm(flat, Spectrum(0.008, 0.0012, 0.8), 3)
     vane = scales(Place(bent.p, bent.p[:2], at.face, at.footprint, at.period, at.seed), 0.030, 0.019, 2)
     side = abs(vane.across)
     own = (vane.random(1) - 0.5) * vane.seen
-    wobble = fbm(flat, Spectrum(0.006, 0.0012, 0.8), 3)
-    barb = np.cos(2 * np.pi * (46 * vane.along + 15 * side + 0.5 * wobble)) * fading(0.0011, at.footprint)
+    slant = 9 * vane.along + 4.5 * side  # barbs leave the shaft towards the tip
+    barb = np.cos(2 * np.pi * 4 * slant + 3 * own) * fading(0.0011, at.footprint)
     tuft = fbm(flat, Spectrum(0.0016, 0.00015, 1.0, (0.7, 1.5, 1), 0.4, patch=0.4), 4)
-    part = (
-        np.clip(np.cos(2 * np.pi * (2.4 * vane.along + 0.8 * side + vane.random(5))) - 0.93, 0, 1)
-        / 0.07
-        * (vane.random(6) < 0.5)
-        * vane.seen
-    )
-    rim, shadow = (np.exp(-np.clip(x, 0, 1) / w) * vane.seen for x, w in ((vane.rim, 0.0022), (vane.under, 0.0026)))
-    shaft = np.exp(-((vane.across / 0.045) ** 2)) * vane.seen
-    bar = threshold(np.cos(2 * np.pi * (2.1 * vane.along + 0.3 * side * side)) + 0.3 * wobble, 0.35, 0.3) * vane.seen + 0.38 * (
-        1 - vane.seen
-    )
+    split = np.clip(np.cos(2 * np.pi * (0.35 * slant + vane.random(5))) - 0.96, 0, 1) / 0.04
+    split = split * np.clip(side - 0.25, 0, 1) * (vane.random(6) < 0.45) * vane.seen
+    fray = 0.0011 * (1 + barb) * (0.4 + side)  # the rim is the ends of barbs
+    shadow = np.exp(-np.clip(vane.under + fray, 0, 1) / 0.0022) * vane.seen
+    soft = np.exp(-np.clip(vane.rim, 0, 1) / 0.0016) * vane.seen
+    shaft = np.exp(-((vane.across / 0.028) ** 2)) * np.clip(1.15 - vane.along, 0, 1) * vane.seen
+    bars = np.cos(2 * np.pi * (0.19 * slant + 0.5 * own - 0.1)) + 0.3 * wobble + 0.1 * tuft
+    bar = threshold(bars, 0.35, 0.25) * vane.seen + 0.36 * (1 - vane.seen)
     color = mix(
         palette(0.5 + 0.6 * own + 0.06 * tuft, "#8a7358", "#a98f70", "#c4ad8e"),
         palette(0.5 + 0.35 * own + 0.08 * tuft, "#3a2c20", "#54402d", "#6d553d"),
-        0.85 * bar,
+        (0.62 + 0.5 * own) * bar,
     )
-    color = mix(color, palette(0.5 + 0.2 * tuft, "#c9b897", "#e6dbc4"), np.clip(0.7 * rim + 0.6 * shaft, 0, 1))
-    color = shade(color, 0.16 * barb + 0.07 * tuft - 0.85 * shadow - 0.5 * part + 0.1 * (0.5 - vane.along) * vane.seen)
-    lift = (1 - rim - 0.9 * vane.along + 0.2 * shaft) * vane.seen - 0.3
-    return Look(
-        tint(color, 0.06 * own),
-        np.clip(0.6 + 0.05 * barb + 0.05 * tuft + 0.15 * shadow, 0, 1),
-        0.0,
-        7e-4 * lift + 2.5e-5 * barb - 1e-4 * part,
-    )
-
-
-CELLS = PEBBLES._replace(radius=0.9, vary=0.45, sharp=0.12, rounding=1.0, slope=0.9, thick=0.6, lift=0.25, tilt=0.0)
-"""Bubbles of a foam: what a heap has as its backs is their hollow."""
+    color = mix(color, palette(0.5 + 0.2 * tuft, "#c9b897", "#e6dbc4"), np.clip(0.28 * soft + 0.55 * shaft, 0, 1))
+    color = shade(color, 0.12 * barb + 0.07 * tuft - 0.9 * shadow - 0.4 * split + 0.1 * (0.5 - vane.along) * vane.seen)
+    lift = (1 - soft - 0.9 * vane.along + 0.25 * shaft) * vane.seen - 0.3
+    rough = np.clip(0.6 + 0.05 * barb + 0.05 * tuft + 0.15 * shadow, 0, 1)
+    return Look(tint(color, 0.06 * own), rough, 0.0, 6e-4 * lift + 2e-5 * barb - 8e-5 * split)
 
 
 def bread(at: Place) -> Look:
-    """The crumb of a white loaf: bubbles of every size pressed against one another, drawn up as it rose, thin pale walls that
-    let light through, dusk in their depth."""
-    bent = warped(at, 0.0012, 0.012, 1, 2)
-    fine = fbm(at, Spectrum(0.0016, 0.00012, 1.0, tails=0.3, skew=-0.1, patch=0.4), 3)
-    wide = fbm(at, Spectrum(0.05, 0.004, 0.8), 4)
-    wall = palette(0.55 + 0.10 * wide + 0.10 * fine, "#e2cda1", "#efdfba", "#f6ecd3", "#faf4e6")
-    color, height = wall, 2e-5 * fine
-    for k, (size, radius) in enumerate(((0.0015, 0.9), (0.0040, 0.68), (0.0105, 0.52))):
-        bubble = heap(bent, size, CELLS._replace(radius=radius), 5 + k, (1, 1.25, 1))
-        deep = np.clip(bubble.height / (0.8 * size), 0, 1)
-        floor = palette(0.92 - 0.8 * deep + 0.08 * fine + 0.2 * (bubble.random(1) - 0.5) * bubble.shown,
-                        "#a98350", "#cdb07f", "#e6d0a4", "#f5e8cb")  # fmt: skip
-        color = mix(color, shade(floor, 0.25 * (bubble.nook - 0.25) * bubble.shown), bubble.cover * (0.55 + 0.15 * k))
-        height = height - (0.13 + 0.02 * k) * bubble.height
-    color = tint(shade(color, 0.06 * fine), 0.03 * wide)
-    return Look(color, np.clip(0.82 + 0.04 * fine, 0, 1), 0.0, height + 3e-4 * wide + 0.0012)
+    """The crust of a loaf: golden, browner where it stood out, wrinkled and blistered as it dried, pores, flour in drifts."""
+    bent = warped(at, 0.006, 0.05, 1, 3)
+    bake = fbm(bent, Spectrum(0.14, 0.008, 0.62, patch=0.2), 2)
+    scorch = fbm(warped(at, 0.003, 0.02, 11, 2), Spectrum(0.022, 0.0015, 0.85, tails=0.3, skew=0.2, patch=0.6), 12)
+    fine = fbm(at, Spectrum(0.0018, 0.00015, 1.0, tails=0.4, skew=0.1, patch=0.4), 3)
+    wrinkle = fbm(warped(at, 0.003, 0.02, 4, 2), Spectrum(0.011, 0.0014, 0.7, patch=0.4), 5)
+    blister = spots(warped(at, 0.0005, 0.003, 6), 0.0080, (0.0004, 0.0022), 0.35, 7)
+    dome = np.clip(blister.inside / 0.0014, 0, 1) * fading(0.003, at.footprint)
+    pore = spots(warped(at, 0.0002, 0.001, 8), 0.0045, (0.00015, 0.0006), 0.3, 9).cover
+    split = cells(warped(at, 0.002, 0.012, 13, 2), 0.020, 14).border
+    crackle = line(split, 0.00012, at.footprint) * fading(0.004, at.footprint)
+    baked = 0.42 + 0.15 * bake + 0.07 * scorch + 0.03 * wrinkle + 0.06 * dome
+    color = palette(baked, "#e8c68e", "#d6a45c", "#bb7f3a", "#985b24", "#6e3c17")
+    color = shade(color, 0.07 * fine + 0.05 * wrinkle - 0.4 * pore - 0.25 * crackle)
+    drift = Spectrum(0.05, 0.0006, 0.75, tails=0.3, patch=0.6)
+    flour = exceeds(fbm(bent, drift, 10) - 0.2 * wrinkle, 1.25, 0.45, lost(bent, drift)) * np.clip(0.7 + 0.3 * fine, 0, 1)
+    color = tint(mix(color, palette(0.6 + 0.2 * fine, "#e6dccb", "#f4eee2"), 0.6 * flour), 0.03 * bake)
+    rough = 0.60 + 0.05 * fine - 0.04 * bake + 0.25 * flour + 0.2 * pore
+    height = 3.0e-4 * wrinkle + 2.5e-4 * dome - 4e-4 * pore - 1.2e-4 * crackle + 2e-5 * fine + 1.2e-3 * bake + 3e-5 * flour
+    return Look(color, np.clip(rough, 0.2, 1), 0.0, height, np.clip(1 - 0.7 * flour, 0, 1))
 
 
 def chocolate(at: Place) -> Look:

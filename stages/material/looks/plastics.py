@@ -100,22 +100,21 @@ def paint(at: Place) -> Look:
 
 
 def car_paint(at: Place) -> Look:
-    """Clear coat over a red base: deep gloss, faint orange peel, swirls of washing, metal flakes that glint, a stone chip."""
-    flakes = Spectrum(0.0009, 0.0003, 1.0, tails=0.9, skew=0.3, patch=0.3)
+    """Clear coat over an even red base: deep gloss, faint orange peel, swirls of washing, flakes that glint, a stone chip."""
+    flakes = Spectrum(0.0006, 0.0002, 1.2, tails=1.2, skew=0.5)
     flake = fbm(at, flakes, 1)
-    peel = fbm(at, Spectrum(0.004, 0.0015, 0.6), 2)
+    peel = fbm(at, Spectrum(0.006, 0.002, 0.6), 2)
     swirl = marks(at.flat, 0.06, 0.00012, 4, 0.0, 6.2, 3, 0.7, 0.35)
-    mist = fbm(at, Spectrum(0.15, 0.004, 0.7), 4)
-    dust = spots(at, 0.007, (0.0001, 0.0004), 0.4, 5).cover
-    chip = spots(warped(at, 0.0003, 0.002, 6), 0.08, (0.0004, 0.0022), 0.35, 7)
-    color = averaged(0.5 + 0.17 * flake + 0.10 * mist, 0.19 * lost(at, flakes), "#5c0b10", "#86121a", "#ab2028", "#d06666")
-    color = shade(color, 0.05 * swirl.cover + 0.2 * dust)
+    dust = spots(at, 0.009, (0.0001, 0.0003), 0.25, 5).cover
+    chip = spots(warped(at, 0.0003, 0.002, 6), 0.11, (0.0004, 0.0018), 0.25, 7)
+    color = averaged(0.42 + 0.13 * flake, 0.15 * lost(at, flakes), "#6e0d13", "#8a131b", "#a81d26", "#d06666", "#f0b0ac")
+    color = shade(color, 0.03 * swirl.cover + 0.15 * dust)
     core = threshold(chip.inside, 0.0004, np.maximum(0.0002, 0.5 * at.footprint))
     color = mix(color, palette(0.5 + 0.3 * flake, "#8f9295", "#c9cbcc"), chip.cover)
     color = mix(color, palette(0.5 + 0.3 * flake, "#4b4f52", "#6d7072"), core)
-    rough = 0.055 + 0.012 * np.clip(mist, -2, 3) + 0.05 * swirl.cover * swirl.random(1) + 0.25 * dust + 0.4 * chip.cover
-    height = 1.2e-5 * peel + 1e-5 * dust - 8e-5 * chip.cover
-    return Look(color, np.clip(rough + 0.008 * flake, 0.01, 1), 0.0, height, 1 - chip.cover)
+    rough = 0.05 + 0.04 * swirl.cover * swirl.random(1) + 0.2 * dust + 0.4 * chip.cover
+    height = 1.4e-5 * peel + 1e-5 * dust - 8e-5 * chip.cover
+    return Look(color, np.clip(rough, 0.01, 1), 0.0, height, 1 - chip.cover)
 
 
 def painted_wood(at: Place) -> Look:

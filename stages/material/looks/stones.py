@@ -398,18 +398,20 @@ def gravel(at: Place) -> Look:
 
 
 def jade(at: Place) -> Look:
-    """Felted fibres of nephrite, polished: pale and spinach green that run into one another, milky flecks, faint seams."""
-    bent = warped(warped(at, 0.012, 0.09, 1, 2), 0.003, 0.02, 2, 2)
-    cloud = fbm(bent, Spectrum(0.09, 0.003, 0.6, (1, 1.5, 1), patch=0.3), 3)
-    milk = fbm(bent, Spectrum(0.03, 0.004, 0.5, (1, 1.8, 1), 0.2, 0.1, 0.3), 4)
-    felt = fbm(at, Spectrum(0.004, 0.0003, 1.0, (1, 1.7, 1), tails=0.5, patch=0.5), 5)
-    seam = np.exp(-np.square(fbm(bent, Spectrum(0.07, 0.006, 0.5), 6) / 0.05)) * np.clip(0.4 + 0.6 * noise(at, 0.05, 7), 0, 1)
-    dark = masked(bent, Spectrum(0.012, 0.0006, 0.85, patch=0.7), 0.03, 8, 0.4)
-    color = palette(0.5 + 0.24 * cloud + 0.04 * felt, "#2a6444", "#3f7f57", "#5c9a70", "#83b48c", "#aecba8")
-    color = mix(color, palette(0.5 + 0.2 * felt, "#bfd6b6", "#e3ecd8"), 0.28 * np.clip(milk - 0.3, 0, 1.5))
-    color = mix(color, palette(0.5 + 0.2 * felt, "#a98f4e", "#cbb47a"), 0.22 * seam * np.clip(0.5 + cloud, 0, 1))
-    color = tint(shade(color, 0.06 * felt - 0.45 * dark), 0.06 * noise(bent, 0.06, 9), 0.06 * cloud)
-    return Look(color, 0.11 + 0.02 * abs(felt) + 0.04 * dark + 0.03 * seam, 0.0, 2e-6 * felt - 4e-6 * seam)
+    """Felted fibres of nephrite, waxy: pale and spinach green that run into one another at depth, healed hairlines with russet
+    beside them, a few dark specks."""
+    bent = warped(warped(at, 0.02, 0.12, 1, 2), 0.004, 0.03, 2, 2)
+    cloud = fbm(bent, Spectrum(0.13, 0.012, 0.5, (1, 1.6, 1), patch=0.2), 3)
+    milk = fbm(bent, Spectrum(0.05, 0.008, 0.5, (1, 2.2, 1), 0.1, 0.1, 0.2), 4)
+    felt = fbm(at, Spectrum(0.006, 0.0003, 0.9, (1, 2.2, 1), tails=0.3, patch=0.4), 5)
+    seam = np.exp(-np.square(fbm(bent, Spectrum(0.16, 0.02, 0.5), 6) / 0.02)) * np.clip(0.3 + 0.7 * noise(at, 0.08, 7), 0, 1)
+    russet = np.exp(-np.square(fbm(bent, Spectrum(0.16, 0.02, 0.5), 6) / 0.16)) * np.clip(0.2 + 0.8 * noise(at, 0.12, 7), 0, 1)
+    speck = spots(warped(at, 0.0004, 0.003, 8), 0.012, (0.0001, 0.0007), 0.18, 9).cover
+    color = palette(0.5 + 0.20 * cloud + 0.05 * felt, "#2f6b4a", "#43835b", "#5f9d74", "#7fb18a", "#a3c4a1")
+    color = mix(color, palette(0.5 + 0.1 * felt, "#bfd6b6", "#dbe7d0"), 0.22 * np.clip(milk, 0, 1.5))
+    color = mix(color, palette(0.5 + 0.2 * felt, "#9a7440", "#c1a06a"), 0.35 * russet * np.clip(0.4 + cloud, 0, 1))
+    color = tint(shade(color, 0.05 * felt - 0.25 * seam - 0.7 * speck), 0.04 * cloud)
+    return Look(color, 0.12 + 0.015 * abs(felt) + 0.02 * seam, 0.0, 1.5e-6 * felt - 3e-6 * seam)
 
 
 def malachite(at: Place) -> Look:

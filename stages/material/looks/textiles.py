@@ -1,6 +1,7 @@
 """Textiles: true threads, plain, twill and satin, knits, piles and felts, ropes, canes and straw."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -24,7 +25,6 @@ from stages.material.patterns import (
     marks,
     noise,
     repeats,
-    tufts,
     warped,
     weave,
     wickerwork,
@@ -218,7 +218,7 @@ def tartan(at: Place) -> Look:
     return Look(color, np.clip(0.9 - 0.12 * (rise - mean) + 0.2 * vary, 0, 1), 0.0, 0.3 * kind.pitch * (rise - mean), 0.3)
 
 
-def thread_rise(loops: Loops, mean: float) -> Array:
+def thread_rise(loops: "Loops | Pile", mean: float) -> Array:
     """Rise of loops, their mean where single ones cannot be seen. Returns: (P,)."""
     return mean + (loops.height - mean) * loops.seen
 
@@ -261,55 +261,76 @@ def felt(at: Place) -> Look:
 
 
 def velvet(at: Place) -> Look:
-    """Dense upright pile: deep where it faces you, pale where it was stroked the other way, in soft-edged swathes."""
+    """Dense upright pile: deep where it faces you, pale where it was stroked the other way, in large soft-edged swathes; close
+    up a fine stipple of fibre tips."""
     flat = at.flat
-    bent = warped(flat, 0.012, 0.12, 1, 2)
-    nap = fbm(bent, Spectrum(0.14, 0.03, 0.5, (0.7, 1.3, 1), patch=0.4), 2)
-    comb = fbm(flat, Spectrum(0.008, 0.0005, 1.0, (0.35, 1.6, 1), 0.4, 0.15, 0.5), 3)
-    tip = fbm(flat, Spectrum(0.0012, 0.00012, 1.05, (0.8, 1.2, 1), 0.5, 0.2, 0.4), 4)
-    turned = 0.45 * np.tanh(0.9 * nap) + 0.22 * comb
-    spectrum = Spectrum(0.0012, 0.00012, 1.05, (0.8, 1.2, 1))
+    bent = warped(flat, 0.03, 0.16, 1, 2)
+    nap = fbm(bent, Spectrum(0.16, 0.05, 0.45, patch=0.3), 2)
+    stroke = fbm(warped(flat, 0.004, 0.03, 5, 2), Spectrum(0.03, 0.006, 0.6, (0.7, 1.4, 1), patch=0.5), 3)
+    tip = fbm(flat, Spectrum(0.0010, 0.00012, 1.1, tails=0.4, skew=0.15, patch=0.2), 4)
+    turned = 0.42 * np.tanh(1.1 * nap) + 0.10 * stroke
+    spectrum = Spectrum(0.0010, 0.00012, 1.1)
     color = averaged(
-        0.42 + 0.22 * turned + 0.13 * tip, 0.13 * lost(flat, spectrum), "#3a0812", "#5a0d1c", "#7d1428", "#a62e40", "#c55a66"
+        0.42 + 0.24 * turned + 0.10 * tip, 0.10 * lost(flat, spectrum), "#3a0812", "#5a0d1c", "#7d1428", "#a62e40", "#c55a66"
     )
-    color = tint(shade(color, 0.05 * tip), 0.06 * comb)
-    return Look(color, np.clip(0.72 - 0.08 * turned + 0.05 * tip, 0, 1), 0.0, 3e-4 * nap + 1.5e-5 * comb + 8e-6 * tip)
+    color = tint(shade(color, 0.04 * tip), 0.04 * stroke)
+    return Look(color, np.clip(0.76 - 0.08 * turned + 0.04 * tip, 0, 1), 0.0, 3e-4 * nap + 4e-5 * stroke + 5e-6 * tip)
+
+
+class Pile(NamedTuple):
+    """Loops of yarn heaped on one another. height: (P,) 0 … 1.2 of the topmost. tone: (P,) 0 … 1, of its yarn. ply: (P,) −1 … 1
+    over its strands. seen: (P,) how much of single loops the footprint shows."""
+
+    height: Array
+    tone: Array
+    ply: Array
+    seen: Array
+
+
+def pile(at: Place, length: float, width: float, bend: float, seed: int) -> Pile:
+    """Loops that flop every way, in four layers. length, width: of a loop, metres. bend: how far it curls."""
+    seen = fading(0.7 * width, at.footprint)
+    sharp = replace(at, footprint=np.minimum(at.footprint, np.float32(0.05 * width)))  # loops hide one another as they are
+    rise, tone, ply = (np.full(len(at), value, np.float32) for value in (0.12, 0.5, 0.0))
+    for k in range(4):
+        loop = marks(sharp, length, width, 12, 1.9 * k, 6.28, seed + k, 0.45, bend)
+        thin = np.sqrt(np.clip(1 - loop.along * loop.along, 1e-3, 1))  # loops narrow towards their ends
+        back = np.sqrt(np.clip(1 - np.square(loop.across / thin), 0, 1))
+        arch = 0.22 * (k + 1) + 0.34 * back * (0.4 + 0.6 * thin)
+        on = (back > 0) & (arch > rise)
+        rise, tone = np.where(on, arch, rise), np.where(on, loop.random(1), tone)
+        turn = np.cos(2 * np.pi * (1.4 * length / width * loop.along / 2 + 0.5 * loop.across))
+        ply = np.where(on, turn, ply)
+    return Pile(np.clip(rise, 0, 1.2), 0.5 + (tone - 0.5) * seen, ply * fading(width / 3, at.footprint), seen)
 
 
 def carpet(at: Place) -> Look:
-    """Loop pile in rows: thick two-ply yarn of heathered wool, each loop lapping over the next, shaded where feet trod."""
-    row, stitch = 0.0048, 0.0066
+    """Loops of heathered wool that flop every way, thick two-ply yarn, dark between, shaded where feet trod."""
     flat = at.flat
-    loops = tufts(flat, row, stitch, 1)
-    mean = usual(tufts, row, stitch)["height"]
+    loops, mean = pile(flat, 0.0125, 0.0050, 0.6, 1), usual(pile, 0.0125, 0.0050, 0.6, 1)["height"]
     rise = thread_rise(loops, mean)
+    fibre = fbm(warped(flat, 0.0006, 0.003, 7, 2), Spectrum(0.0016, 0.0002, 1.0, tails=0.4, skew=-0.1, patch=0.4), 8)
     trod = fbm(warped(flat, 0.02, 0.1, 5, 3), Spectrum(0.3, 0.006, 0.8, patch=0.5), 6)
-    lean = np.where(loops.across > 0, flat.p[1], -flat.p[1])
-    fibre = fbm(flat.moved(np.stack([lean, 0 * lean, 0 * lean])), Spectrum(0.0016, 0.0002, 1.0, (1, 4, 1), 0.4, -0.1, 0.4), 8)
-    ply = np.cos(2 * np.pi * (0.75 * loops.across + 1.6 * loops.along)) * fading(0.0012, at.footprint)
-    own = (loops.random(5) - 0.5) * loops.seen
-    color = averaged(0.5 + 0.85 * own + 0.14 * fibre, 0.25 * (1 - loops.seen), "#6f6257", "#8b7b6c", "#a39281", "#b6a693")
-    color = relieved(shade(color, 0.14 * fibre + 0.12 * ply + 0.08 * trod), rise, mean, 1.15)
-    color = tint(color, 0.10 * (loops.random(6) - 0.5) * loops.seen)
-    height = 0.0034 * (rise - mean) + 1.5e-4 * ply + 8e-5 * fibre + 0.001 * trod
+    wool = 0.5 + 0.8 * (loops.tone - 0.5) + 0.14 * fibre
+    color = averaged(wool, 0.25 * (1 - loops.seen), "#6f6257", "#8b7b6c", "#a39281", "#b6a693")
+    color = relieved(shade(color, 0.14 * fibre + 0.10 * loops.ply + 0.08 * trod), rise, mean, 1.0)
+    height = 0.0042 * (rise - mean) + 1.5e-4 * loops.ply + 8e-5 * fibre + 0.001 * trod
     return Look(color, np.clip(0.95 + 0.03 * fibre - 0.06 * (rise - mean), 0, 1), 0.0, height)
 
 
 def towel(at: Place) -> Look:
-    """Terry: loops of soft white cotton that stand in rows and flop to either side, twisted, shaded at their feet."""
-    row, stitch = 0.0021, 0.0030
+    """Terry: soft white cotton loops that flop every way, in faint rows of the loom, twisted, shaded at their feet."""
     flat = at.flat
-    loops = tufts(flat, row, stitch, 1, 1.6)
-    mean = usual(tufts, row, stitch, 0, 1.6)["height"]
+    loops, mean = pile(flat, 0.0044, 0.0014, 0.9, 1), usual(pile, 0.0044, 0.0014, 0.9, 1)["height"]
     rise = thread_rise(loops, mean)
     fibre = fbm(warped(flat, 0.0003, 0.0016, 7, 2), Spectrum(0.0014, 0.00012, 1.0, tails=0.4, patch=0.3), 8)
     wide = fbm(flat, Spectrum(0.08, 0.003, 0.9, patch=0.4), 9)
-    ply = np.cos(2 * np.pi * (0.6 * loops.across + 2.6 * loops.along)) * fading(0.0005, at.footprint)
-    own = (loops.random(5) - 0.5) * loops.seen
-    color = palette(0.55 + 0.5 * own + 0.12 * fibre, "#d3d1ca", "#e3e1dc", "#eeece8")
-    color = relieved(shade(color, 0.05 * fibre + 0.06 * ply + 0.03 * wide + 0.12 * own), rise, mean, 0.62)
-    height = 0.0013 * (rise - mean) + 6e-5 * ply + 2e-5 * fibre + 1e-4 * wide
-    return Look(tint(color, 0.02 * noise(flat, 0.02, 12)), np.clip(0.94 + 0.03 * fibre, 0, 1), 0.0, height)
+    across, _, pitch = repeats(flat, 0.0034, 0)
+    row = np.cos(np.pi * across) * fading(pitch / 2, at.footprint)
+    color = palette(0.6 + 0.25 * (loops.tone - 0.5) + 0.10 * fibre, "#d8d6d0", "#e6e4df", "#efede9")
+    color = relieved(shade(color, 0.04 * fibre + 0.04 * loops.ply + 0.03 * wide + 0.02 * row), rise, mean, 0.5)
+    height = 0.0010 * (rise - mean) + 3e-5 * loops.ply + 2e-5 * fibre + 1e-4 * wide + 1.2e-4 * row
+    return Look(tint(color, 0.02 * noise(flat, 0.02, 12)), np.clip(0.96 + 0.03 * fibre, 0, 1), 0.0, height)
 
 
 def corduroy(at: Place) -> Look:
