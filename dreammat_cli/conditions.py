@@ -52,6 +52,8 @@ DEFAULT = defaults(ConditionsOptions)
               metavar="LOW HIGH", help="Share of the half-frame that the object reaches.")
 @click.option("--profile", type=click.Choice(["gltf", "sd"]), default=DEFAULT["profile"], show_default=True,
               help="sd: also smooth normals and Blender's light maps with a bounce, as the released ControlNet knows them.")
+@click.option("--bounces", type=click.IntRange(0, 8), default=DEFAULT["bounces"], show_default=True,
+              help="Of light between the object's surfaces; 0 for direct light alone.")
 @click.option("--maps", is_flag=True, help="Also write maps_<environment>.exr for every view.")
 @click.option("--shard", type=Shard(), default=DEFAULT["shard"], metavar="I/N",
               help="Make the I-th of N parts of the views, for N machines, each in a folder of its own.")

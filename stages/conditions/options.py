@@ -30,6 +30,8 @@ class ConditionsOptions:
     """for whom: "gltf" for the embedded prior and for references; "sd" adds what the released ControlNet was trained on"""
     maps: bool = False
     """also write the condition maps of every view as maps_<environment>.exr"""
+    bounces: int = 0
+    """of light between the object's surfaces; 0 for direct light alone"""
     shard: tuple[int, int] = (1, 1)
     """make the I-th of N parts of the views alone, to be merged"""
     merge: tuple[Path, ...] = ()

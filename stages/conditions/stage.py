@@ -35,7 +35,7 @@ from stages.core.artifact import (
 from stages.core.errors import InputError, NumericalError, OutputError
 from stages.core.naming import guess
 from stages.core.progress import Progress, silent
-from stages.core.schemas import CAMERAS, CONDITIONS, PREP, SURVEY
+from stages.core.schemas import BOUNCES, CAMERAS, CONDITIONS, PREP, SURVEY, VIEW_BOUNCES
 from stages.core.shading import KNOTS, Transport
 from stages.core.texture_sets import triangle_sets
 from stages.core.tiles import Representatives
@@ -50,12 +50,18 @@ from stages.core.views import (
     write_transport,
 )
 from stages.light.bounce import blender_light_maps
+from stages.light.ends import Ends
 from stages.light.environment import Environment, load_environment, save_environment
+from stages.light.exchange import Between
 from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.lights import BUILTIN
 from stages.light.scene import Scene
-from stages.light.transport import QUALITY, Quality, light_transport
+from stages.light.terms import GLTF
+from stages.light.transport import QUALITY, Quality, transport_and_ends
 from stages.material.survey import make_survey
+
+BETWEEN = "bounces.npz"
+"""Of the whole folder, and of each view."""
 
 REQUEST = "request.json"
 """What an unfinished folder was asked for; a rerun that asks for the same continues it."""
@@ -88,6 +94,8 @@ def conditions(
     names = tuple(light.name for light in lights)
     chosen = plain_options(replace(options, env=names))
     del chosen["shard"], chosen["merge"]  # views are the same, however they were divided
+    if not options.bounces:
+        del chosen["bounces"]  # the same bytes as before there were any
     request = Provenance(chosen, options.seed, {"prep": sha256_file(prep), **hashes})
     mine, whole = views_of(options.shard, options.views), options.shard[1] == 1
     done = None if force else peek(out, CONDITIONS if whole else SHARD)
@@ -111,19 +119,23 @@ def conditions(
             progress("choosing rays", 0, 1)
             first = trace_view(scene, cameras.c2w[0], float(cameras.fov_y[0]), options.size, options.size)
             quality, expected = choose_quality(scene, first, lights, options.error, options.seed)
+        between = between_surfaces(scene, lights, options, progress)
+        options = replace(options, bounces=options.bounces if between else 0)
         missing = [view for view in mine if not view_is_there(out, view, names, options)]
         made = len(missing)
         with ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
             written = writer.submit(save_survey, out, scene, label, request) if whole else None
             for i, view in enumerate(missing):
                 progress("views", len(mine) - made + i, len(mine))
-                traced = trace(view, subject, cameras, lights, quality, options)
+                traced = trace(view, subject, cameras, lights, quality, options, between)
                 if written:
                     written.result()
-                written = writer.submit(write, out, view, lights, traced, options)
+                written = writer.submit(write, out, view, lights, traced, options, request)
             if written:
                 written.result()
         progress("views", len(mine), len(mine))
+        if whole and between is not None:
+            save_npz(out / BETWEEN, BOUNCES, bounces_arrays(between, subject, quality), request)
         if whole:
             write_sheet(out, sheet(out, names, options.views))
         log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(quality), "expected_percent": expected}
@@ -137,6 +149,7 @@ def conditions(
         "to_world": mesh["to_world"].ravel().tolist(),
         "parts": [part.to_json() for part in labelled_parts(mesh)],
         "shared_labels": shared_labels(subject),
+        "bounces": options.bounces,
     }
     if whole:
         files = expected_files(names, options)
@@ -180,7 +193,7 @@ def start_folder(out: Path, request: Provenance, force: bool) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
         if force or read_json(out / REQUEST) != asked:
-            for name in (MANIFEST, SHARD.manifest, REQUEST, "cameras.npz", "survey.npz", "sheet.png", "run.json"):
+            for name in (MANIFEST, SHARD.manifest, REQUEST, BETWEEN, "cameras.npz", "survey.npz", "sheet.png", "run.json"):
                 (out / name).unlink(missing_ok=True)
             for folder in [out / "environments", *out.glob("view_[0-9][0-9][0-9]*")]:
                 shutil.rmtree(folder, ignore_errors=True)
@@ -204,7 +217,9 @@ def save_cameras(out: Path, cameras: Cameras, request: Provenance, options: Cond
 
 def view_is_there(out: Path, view: int, names: tuple[str, ...], options: ConditionsOptions) -> bool:
     """Whether every file of a view has been written, and none of them damaged since: no manifest tells of it yet."""
-    return all(is_readable_exr(out / name) for name in view_files(view, names, options))
+    *images, last = view_files(view, names, options)
+    there = peek(out / last, VIEW_BOUNCES) is not None if options.bounces else is_readable_exr(out / last)
+    return there and all(is_readable_exr(out / name) for name in images)
 
 
 def view_files(view: int, names: tuple[str, ...], options: ConditionsOptions) -> list[str]:
@@ -212,13 +227,14 @@ def view_files(view: int, names: tuple[str, ...], options: ConditionsOptions) ->
     kinds = ["geometry", *names, *(f"maps_{name}" for name in names if options.maps)]
     if options.profile == SD:
         kinds += [f"{SD}/{kind}" for kind in ("geometry", *names)]
-    return [f"{view_folder(view)}/{kind}.exr" for kind in kinds]
+    return [f"{view_folder(view)}/{kind}.exr" for kind in kinds] + [f"{view_folder(view)}/{BETWEEN}"] * (options.bounces > 0)
 
 
 def expected_files(names: tuple[str, ...], options: ConditionsOptions) -> list[str]:
     """Relative paths of everything a complete folder holds."""
     views = [file for view in range(options.views) for file in view_files(view, names, options)]
-    return ["cameras.npz", "survey.npz", "sheet.png", *(f"environments/{name}.exr" for name in names), *views]
+    between = [BETWEEN] * (options.bounces > 0)
+    return ["cameras.npz", "survey.npz", "sheet.png", *between, *(f"environments/{name}.exr" for name in names), *views]
 
 
 @dataclass(frozen=True)
@@ -240,12 +256,16 @@ class Subject:
 
 @dataclass(frozen=True)
 class View:
-    """What is written of a view. transports: one a light. smooth, maps: of the profile sd, or None: geometry, light maps."""
+    """What is written of a view. transports: one a light. smooth, maps: of the profile sd, or None: geometry, light maps.
+
+    ends: where blocked rays end, or None.
+    """
 
     geometry: Geometry
     transports: list[Transport]
     smooth: Geometry | None = None
     maps: list[Tensor] | None = None
+    ends: Ends | None = None
 
 
 def trace(
@@ -255,24 +275,27 @@ def trace(
     lights: list[Environment],
     quality: Quality,
     options: ConditionsOptions,
+    between: Between | None = None,
 ) -> View:
     """One view under every environment. Raises: NumericalError."""
     scene, smooth = subject.scene, subject.smooth
     camera = cameras.c2w[view], float(cameras.fov_y[view]), options.size, options.size
     points, seed = trace_view(scene, *camera), options.seed * 1_000_003 + view
-    transports = light_transport(scene, points, lights, quality, seed)
+    transports, ends = transport_and_ends(scene, points, lights, quality, seed, None if between is None else between.cells)
     for light, transport in zip(lights, transports, strict=True):
         check_finite(transport, light.name, view, options.seed)
     label, shown = shown_points(subject, points)
     geometry = Geometry(points.mask, points.depth, view_normals(points, camera[0]), label, shown)
     if smooth is None:
-        return View(geometry, transports)
+        return View(geometry, transports, ends=ends)
     points = trace_view(smooth, *camera)
     maps = blender_light_maps(smooth, points, lights, quality, seed)
-    return View(geometry, transports, replace(geometry, normal=view_normals(points, camera[0]), shown=None), maps)
+    return View(geometry, transports, replace(geometry, normal=view_normals(points, camera[0]), shown=None), maps, ends)
 
 
-def write(out: Path, view: int, lights: list[Environment], traced: View, options: ConditionsOptions) -> None:
+def write(
+    out: Path, view: int, lights: list[Environment], traced: View, options: ConditionsOptions, request: Provenance
+) -> None:
     """The files of one view."""
     mask = traced.geometry.mask
     write_geometry(out, view, traced.geometry)
@@ -280,6 +303,8 @@ def write(out: Path, view: int, lights: list[Environment], traced: View, options
         write_transport(out, view, light.name, mask, transport)
         if options.maps:
             write_maps(out, view, light.name, traced.geometry, transport)
+    if traced.ends is not None:
+        save_npz(out / view_folder(view) / BETWEEN, VIEW_BOUNCES, traced.ends.to_arrays(), request)
     if traced.smooth is not None and traced.maps is not None:
         write_geometry(out, view, traced.smooth, SD)
         for light, maps in zip(lights, traced.maps, strict=True):
@@ -295,15 +320,46 @@ def view_normals(points: GBuffer, c2w: NDArray) -> NDArray[np.float32]:
 
 def shown_points(subject: Subject, points: GBuffer) -> tuple[NDArray[np.int32], NDArray[np.float32] | None]:
     """Labels, and what represents each pixel, as in `Geometry.label` and `shown`."""
-    scene, shared, triangle = subject.scene, subject.shared, points.triangle
+    shared, triangle = subject.shared, points.triangle
     label, image = np.zeros(points.mask.shape, np.int32), None
     if shared is not None:
-        triangle, weights = shared.of(points.triangle, points.barycentric)
-        scale = shared.scale(subject.area, points.triangle, triangle)
         image = np.zeros((*points.mask.shape, 7), np.float32)
-        image[points.mask] = np.c_[scene.point(triangle, weights), scene.smooth_normal(triangle, weights), scale]
+        triangle, image[points.mask] = represented(subject, points.triangle, points.barycentric)
     label[points.mask] = subject.label[triangle]
     return label, image
+
+
+def represented(subject: Subject, triangle: NDArray, barycentric: NDArray) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """What represents the texels of some points: its triangle (P,); its place, normal and scale (P, 7)."""
+    scene, shared, found = subject.scene, subject.shared, triangle
+    scale = np.ones(len(triangle), np.float32)
+    if shared is not None:
+        found, barycentric = shared.of(triangle, barycentric)
+        scale = shared.scale(subject.area, triangle, found)
+    place, normal = scene.point(found, barycentric), scene.smooth_normal(found, barycentric)
+    return found, np.c_[place, normal, scale].astype(np.float32)
+
+
+def between_surfaces(
+    scene: Scene, lights: list[Environment], options: ConditionsOptions, progress: Progress
+) -> Between | None:
+    """What is known of bounces before any view is traced; None without, or where the object sees nothing of itself."""
+    if not options.bounces:
+        return None
+    progress("light between surfaces", 0, 1)
+    found = Between.of(scene, lights, options.seed)
+    progress("light between surfaces", 1, 1)
+    return found
+
+
+def bounces_arrays(between: Between, subject: Subject, quality: Quality) -> dict[str, NDArray]:
+    """As `BOUNCES` has them."""
+    cells, exchange = between.cells, between.exchange
+    triangle, shown = represented(subject, cells.triangle, cells.barycentric)
+    arrays = {"weight": exchange.weight, "direct": exchange.direct, **exchange.ends.to_arrays()}
+    arrays |= {"cell_point": shown[:, :3].copy(), "cell_normal": shown[:, 3:6].copy(), "cell_scale": shown[:, 6].copy()}
+    arrays |= {"cell_label": subject.label[triangle], "cell_width": np.array(cells.width, np.float32)}
+    return arrays | {"lobe_rays": GLTF.counts(quality.lobe).astype(np.int32)}
 
 
 def shared_labels(subject: Subject) -> list[tuple[int, int, float]]:

@@ -65,15 +65,48 @@ CAMERAS = Schema(
 
 CONDITIONS = Schema(
     "dreammat.conditions",
-    3,
+    4,
     # environments: names; views: count; knots: roughness of each A and B; clamped: name -> mended texels;
     # to_world: 16 numbers, the mesh source's frame to world, row by row; profile: "gltf", or "sd", which has files of its own
     # parts: {"number", "kind", "name", "share", "labels"} each, see `asset.parts`; shared_labels: [label, label that represents
     # it in a texel that both share, share of the first's area] each
-    extra=("environments", "views", "knots", "clamped", "to_world", "parts", "shared_labels"),
+    # bounces: of light between surfaces; 0 also where the object sees next to nothing of itself
+    extra=("environments", "views", "knots", "clamped", "to_world", "parts", "shared_labels", "bounces"),
 )
 """A folder: cameras.npz, survey.npz, environments/<name>.exr, view_NNN/geometry.exr, view_NNN/<environment>.exr; see
-`core.views`."""
+`core.views`. With bounces also bounces.npz and view_NNN/bounces.npz.
+"""
+
+ENDS = {
+    "start": Field("i4", ("P1",)),  # where each point's blocked rays begin; the last is a mirror's where `mirror` is not 0
+    "mirror": Field("u1", ("P",)),
+    "side": Field("u2", ("R",)),  # side of a cell on which a ray ends; where a mirror there looks; and one there
+    "second": Field("u2", ("R",)),
+    "third": Field("u2", ("R",)),
+    **{f"lobe_{name}": Field("u1", ("Q", 2)) for name in ("towards", "onward", "beyond")},  # on the octahedral square
+    **{f"mirror_{name}": Field("u2", ("M", 2)) for name in ("towards", "onward", "beyond")},
+}
+"""Where blocked rays end, see `light.ends`."""
+
+BOUNCES = Schema(
+    "dreammat.bounces",
+    1,
+    {
+        **ENDS,  # of the sides' rays; P1 is S + 1
+        "weight": Field("f4", ("R",)),
+        "direct": Field("f4", ("S", "L", 3)),  # direct light of both sides of each cell, under each environment
+        "cell_point": Field("f4", ("C", 3)),  # where the material of a cell is asked for, its normal, label and scale there
+        "cell_normal": Field("f4", ("C", 3)),
+        "cell_label": Field("i4", ("C",)),
+        "cell_scale": Field("f4", ("C",)),
+        "cell_width": Field("f4", ()),
+        "lobe_rays": Field("i4", ("K",)),  # of each pixel, lobe by lobe
+    },
+)
+"""Light between surfaces, whatever they are made of; see `light.exchange`."""
+
+VIEW_BOUNCES = Schema("dreammat.view_bounces", 1, ENDS)
+"""Where the blocked rays of a view's pixels end."""
 
 SURVEY = Schema(
     "dreammat.survey",

@@ -43,6 +43,11 @@ class Transport:
         """Every tensor moved or cast as `Tensor.to` does."""
         return Transport(*(t.to(*args, **kwargs) for t in (self.E, self.A, self.B, self.cosine)))
 
+    def split(self, counts: list[int]) -> list["Transport"]:
+        """As `Tensor.split`: consecutive points, so many each."""
+        parts = (t.split(counts) for t in (self.E, self.A, self.B, self.cosine))
+        return [Transport(*some) for some in zip(*parts, strict=True)]
+
     def packed(self) -> Tensor:
         """All values of a point in one row: (P, WIDTH), the order of `unpack`."""
         return torch.cat([self.E, self.A.flatten(1), self.B.flatten(1), self.cosine[:, None]], 1)

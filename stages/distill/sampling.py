@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core.shading import WIDTH, Transport
-from stages.distill.views import CACHE_BYTES, READERS, Surface, Views
+from stages.distill.views import CACHE_BYTES, HALF_MAX, READERS, Surface, Views
+from stages.light.leaving import OwnLight
 
 WHOLE_VIEW_SHARE = 0.5
 """Share of crops that show the whole view; the others are zoomed in, each stride as likely as the next."""
@@ -50,7 +51,8 @@ class Sample:
     """What one step shows: P points, each under `lights` = L lights. points, normals: (P, 3) world, where their material is
     asked for (on shared texels what represents them). footprint, label: (P,) there.
 
-    transport: of P L rows, all lights of a point after each other. source: (view, environment) of each image, for messages.
+    transport: of P L rows, all lights of a point after each other. source: (view, environment) of each image, and where:
+    which of that view's object pixels it shows, in their order.
     images: the layout of crops; rows: (P,) of loose pixels in their pool. The one that does not apply is None. given: what the
     guidance makes of the rest before it is asked.
     """
@@ -62,6 +64,7 @@ class Sample:
     lights: int
     transport: Transport
     source: tuple[tuple[int, int], ...] = ()
+    where: tuple[NDArray[np.int64], ...] = ()
     images: Images | None = None
     rows: Tensor | None = None
     given: Any = None
@@ -113,7 +116,14 @@ class CropSampler:
         images = Images(self._batch, self._size, where, surface, azimuth, elevation, self._maps(keys, crops))
         width = torch.cat(footprint).to(self._device)
         points, normals, label = surface.shown, surface.shown_normals, surface.label
-        return Sample(points, normals, width, label, 1, transport, tuple(keys), images=images)
+        where_in_views = tuple(rows for rows, *_ in crops)
+        return Sample(points, normals, width, label, 1, transport, tuple(keys), where_in_views, images=images)
+
+    def with_own_light(self, own: list[OwnLight], sample: Sample) -> Transport:
+        """Transport of a sample's points with what the object throws on itself."""
+        parts = sample.transport.split([len(rows) for rows in sample.where])
+        lit = [self._views.with_own_light(own, *job) for job in zip(sample.source, sample.where, parts, strict=True)]
+        return Transport(*(self._join(lit, name) for name in Transport.__annotations__))
 
     def _maps(
         self, keys: list[tuple[int, int]], crops: list[tuple[NDArray[np.int64], NDArray[np.int64], int]]
@@ -171,7 +181,10 @@ class PixelSampler:
     points, eyes: (M, 3) world, what is seen and the cameras' positions.
     """
 
-    def __init__(self, views: Views, count: int, generator: torch.Generator, device: torch.device) -> None:
+    def __init__(
+        self, views: Views, count: int, generator: torch.Generator, device: torch.device, own: list[OwnLight] | None = None
+    ) -> None:
+        """Args: own: what the object throws on itself, to be added."""
         self._count, self.device = count, device
         share = min(1.0, CACHE_BYTES / _pool_bytes(views))
         rows = [_subset(len(views.pixels(view)), share, generator) for view in views.seen]
@@ -182,7 +195,7 @@ class PixelSampler:
         self._where = (*shown, torch.cat(widths), label)  # points, normals, footprints and labels of the material
         eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
         self.eyes = torch.from_numpy(eyes.astype(np.float32))
-        self._lights = _pooled_lights(views, rows)  # (M, L, WIDTH)
+        self._lights = _pooled_lights(views, rows, own)  # (M, L, WIDTH)
         self._chance = even_chance(self.points, CELL * views.pixel_size())  # (M,)
 
     def draw(self, generator: torch.Generator) -> Sample:
@@ -220,7 +233,7 @@ def _subset(count: int, share: float, generator: torch.Generator) -> NDArray[np.
     return chosen.sort().values.numpy()
 
 
-def _pooled_lights(views: Views, rows: list[NDArray[np.int64]]) -> Tensor:
+def _pooled_lights(views: Views, rows: list[NDArray[np.int64]], own: list[OwnLight] | None) -> Tensor:
     """Packed transport of the chosen rows of every view under every environment: (M, L, WIDTH) float16."""
     starts = np.cumsum([0, *map(len, rows)])
     pool = torch.empty(int(starts[-1]), len(views.environments), WIDTH, dtype=torch.half)
@@ -228,7 +241,9 @@ def _pooled_lights(views: Views, rows: list[NDArray[np.int64]]) -> Tensor:
     def fill(job: tuple[int, int]) -> None:
         i, environment = job
         transport = views.read_transport((views.seen[i], environment))[torch.from_numpy(rows[i])]
-        pool[starts[i] : starts[i + 1], environment] = transport.packed()
+        if own is not None:
+            transport = views.with_own_light(own, (views.seen[i], environment), rows[i], transport)
+        pool[starts[i] : starts[i + 1], environment] = transport.packed().clamp(max=HALF_MAX)
 
     jobs = [(i, e) for i in range(len(views.seen)) for e in range(len(views.environments))]
     with ThreadPoolExecutor(READERS) as readers:

@@ -18,7 +18,7 @@ from stages.core.errors import InputError, NumericalError
 from stages.core.parallel import ahead, cores
 from stages.core.progress import Progress, Tell, silent, untold
 from stages.core.schemas import MATERIAL
-from stages.core.shading import Material, shade
+from stages.core.shading import Material, Transport, shade
 from stages.distill import checkpoint, regularizers, schedule
 from stages.distill.base import Base
 from stages.distill.checkpoint import State, step_generator
@@ -35,6 +35,7 @@ from stages.distill.regions import Regions
 from stages.distill.sampling import CropSampler, PixelSampler, Sample
 from stages.distill.start import least_like_light
 from stages.distill.views import Views
+from stages.light.leaving import OwnLight
 from stages.material.library import Library, hashes
 from stages.material.recipe import EVEN, Recipe
 from stages.material.residual import Residual, ResidualConfig, combined
@@ -63,7 +64,10 @@ class DistillResult:
 
 @dataclass
 class Run:
-    """One call of `distill`: what stays the same from step to step, and the state that does not."""
+    """One call of `distill`: what stays the same from step to step, and the state that does not.
+
+    own: what the object throws on itself as the recipe has it, for a guidance that sees crops; None without bounces.
+    """
 
     out: Path
     views: Views
@@ -74,6 +78,7 @@ class Run:
     request: Provenance
     state: State
     clock: "Clock"
+    own: list[OwnLight] | None = None
 
     @property
     def progress(self) -> float:
@@ -115,7 +120,7 @@ def _distill(
         state = new_state(options, views, device, base.recipe)
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
-        run = Run(out, views, guidance, base, options, budget, request, state, clock)
+        run = Run(out, views, guidance, base, options, budget, request, state, clock, own_light(views, guidance, base))
         lines += shared(claims, views.shared_labels)
         for line in [*lines, *(parts(base.recipe) if guidance.recipe != EVEN else ())]:
             tell(line)
@@ -170,7 +175,8 @@ def make_guidance(
             raise InputError("--guidance reference: no model is given; add --reference MODEL.glb")
         asset = TexturedModel(options.reference, views.to_world)
         chosen = step_generator(options.seed, POOL)
-        pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device)
+        thrown = None if views.bounces is None else views.bounces.solved(reference.material_of(asset, views.bounces))
+        pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device, thrown)
         return reference.ReferenceGuidance(asset, pool)
     if options.guidance not in ("prior", "sd"):
         raise InputError(f"--guidance {options.guidance}: unknown; expected prior, sd or reference")
@@ -226,6 +232,17 @@ def new_state(options: DistillOptions, views: Views, device: torch.device, recip
     return State(residual, moves, RowAdam(parameters, tables=frozenset({"table", "offsets"})))
 
 
+def own_light(views: Views, guidance: Guidance, base: Base) -> list[OwnLight] | None:
+    """What the object throws on itself where it is made as the recipe says; None without bounces.
+
+    What is learnt is held near to the recipe and adds little to it. A guidance of loose pixels knows better: its pool has it.
+    """
+    if views.bounces is None or not isinstance(guidance.sampler, CropSampler):
+        return None
+    cells = views.bounces
+    return cells.solved(base.at(cells.points, cells.normals, cells.footprint, cells.label)[0])
+
+
 def _all_steps(run: Run, progress: Progress) -> None:
     """Do the steps that are left, with a checkpoint now and then and when interrupted."""
     state, saved = run.state, time.perf_counter()
@@ -249,10 +266,11 @@ def _all_steps(run: Run, progress: Progress) -> None:
 
 @dataclass(frozen=True)
 class Shown:
-    """What a step shows: a sample, the recipe's material of its points (P, 5), how much of each is each coat's (P, K), and the
-    generator that draws the rest."""
+    """What a step shows: a sample, its transport with what the object throws on itself, the recipe's material of its points
+    (P, 5), how much of each is each coat's (P, K), and the generator that draws the rest."""
 
     sample: Sample
+    transport: Transport
     base: Tensor
     shares: Tensor
     generator: torch.Generator
@@ -264,9 +282,12 @@ def draw(run: Run, step: int) -> Shown:
     with run.clock("data"):
         sample = run.guidance.draw(generator)
         run.guidance.sampler.prefetch(step_generator(run.options.seed, step + 1))
+        transport = sample.transport
+        if run.own is not None and isinstance(run.guidance.sampler, CropSampler):
+            transport = run.guidance.sampler.with_own_light(run.own, sample)
     with run.clock("recipe"):
         base, shares = run.base.of(sample)
-    return Shown(sample, base, shares, generator)
+    return Shown(sample, transport, base, shares, generator)
 
 
 def optimisation_step(run: Run, shown: Shown) -> float:
@@ -278,7 +299,7 @@ def optimisation_step(run: Run, shown: Shown) -> float:
         moved = state.moves(base, shown.shares) if run.guidance.held else torch.zeros_like(learnt)
         material = Material.of(combined(base, learnt + moved))
     with clock("shading"):
-        radiance = shade(sample.transport, material)
+        radiance = shade(shown.transport, material)
     with clock("guidance"):
         response = run.guidance.respond(radiance.detach(), sample, run.progress, generator)
     if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):

@@ -26,6 +26,8 @@ from stages.core.artifact import MANIFEST, Provenance, intact, load_npz, read_ma
 from stages.core.errors import ArtifactError
 from stages.core.shading import KNOTS, LIGHT_MAPS, WIDTH, Transport
 from stages.core.views import SD, read_geometry, read_light_maps, read_transport
+from stages.distill.bounces import Bounces
+from stages.light.leaving import OwnLight
 from stages.material.survey import Lookup, Survey
 
 CACHE_BYTES = 2 << 30
@@ -87,6 +89,8 @@ class Views:
         self.parts, self.shared_labels = read_parts(folder, provenance)
         if tuple(provenance.extra["knots"]) != KNOTS:
             raise ArtifactError(f"{folder}: roughness knots differ from this version's; make the conditions again")
+        asked = int(provenance.extra["bounces"])
+        self.bounces = Bounces(folder, self.files, self.environments, asked) if asked else None
         self._geometry = self._read_geometry()
         self._smooth: dict[int, Tensor] = {}
         self.seen = [view for view, geometry in enumerate(self._geometry) if len(geometry.pixels)]
@@ -135,6 +139,16 @@ class Views:
     def transport(self, view: int, environment: int) -> Transport:
         """Light transport of all object pixels of a view, float16."""
         return self._cache.get((view, environment))
+
+    def with_own_light(
+        self, own: list[OwnLight], place: tuple[int, int], rows: NDArray[np.int64], transport: Transport
+    ) -> Transport:
+        """Transport of some object pixels with what the object throws on itself. Args: place: view and environment."""
+        assert self.bounces is not None
+        surface, eye = self.surface(place[0], rows), self.c2w[place[0]][:3, 3]
+        wo = eye - surface.points.numpy()
+        wo = (wo / np.linalg.norm(wo, axis=1, keepdims=True)).astype(np.float32)
+        return self.bounces.added(own, transport, place, rows, surface.normals, wo)
 
     def light_maps(self, view: int, environment: int) -> Tensor:
         """Light maps of the profile sd, of all object pixels of a view, (P, 6, 3) float16."""

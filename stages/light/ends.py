@@ -8,7 +8,7 @@ Directions are kept in two 16-bit numbers on the octahedral square. Normal maps 
 show, and what other objects of a scene block stays dark.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,11 +68,42 @@ class Ends:
         rays = (np.concatenate(arrays) for arrays in zip(*(part.rays for part in parts), strict=True))
         return Ends(start.astype(np.int32), np.concatenate([part.mirror for part in parts]), *rays)
 
+    def to_arrays(self) -> dict[str, NDArray]:
+        """As `core.schemas.ENDS` has them: directions of lobes, which see nothing sharp, in 8 bits, those of mirrors in 16."""
+        last = _last(self.start, self.mirror)
+        arrays: dict[str, NDArray] = {"start": self.start, "mirror": self.mirror.astype(np.uint8)}
+        arrays |= {"side": self.side, "second": self.second, "third": self.third}
+        for name in ("towards", "onward", "beyond"):
+            steps = getattr(self, name)
+            arrays[f"lobe_{name}"] = np.rint(steps[~last] / (STEPS / 255)).astype(np.uint8)
+            arrays[f"mirror_{name}"] = steps[last]
+        return arrays
+
+    @staticmethod
+    def from_arrays(arrays: Mapping[str, NDArray]) -> "Ends":
+        """The inverse of `to_arrays`."""
+        start, mirror = arrays["start"], arrays["mirror"] != 0
+        last = _last(start, mirror)
+        directions = []
+        for name in ("towards", "onward", "beyond"):
+            steps = np.empty((len(last), 2), np.uint16)
+            steps[~last] = arrays[f"lobe_{name}"].astype(np.uint16) * np.uint16(STEPS // 255)
+            steps[last] = arrays[f"mirror_{name}"]
+            directions.append(steps)
+        return Ends(start, mirror, arrays["side"], arrays["second"], arrays["third"], *directions)
+
     @staticmethod
     def none(points: int) -> "Ends":
         """Of points that see nothing of the object."""
         short, pair = np.zeros(0, np.uint16), np.zeros((0, 2), np.uint16)
         return Ends(np.zeros(points + 1, np.int32), np.zeros(points, np.bool_), short, short, short, pair, pair, pair)
+
+
+def _last(start: NDArray[np.int32], mirror: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which rays are mirrors' (R,)."""
+    last = np.zeros(start[-1], np.bool_)
+    last[start[1:][mirror] - 1] = True
+    return last
 
 
 def find_ends(

@@ -57,6 +57,28 @@ class Exchange:
         return own
 
 
+LEAST = 0.01
+"""Share of what its sides see that must be the object itself, on average, for light between surfaces to be worth anything."""
+
+
+@dataclass(frozen=True)
+class Between:
+    """What is known of the light between an object's surfaces before any view is traced."""
+
+    cells: Cells
+    exchange: Exchange
+
+    @staticmethod
+    def of(scene: Scene, environments: list[Environment], seed: int) -> "Between | None":
+        """None where the object sees next to nothing of itself."""
+        if scene.outermost[:, 0].all():
+            return None
+        cells = Cells.of(scene)
+        exchange = make_exchange(scene, cells, environments, seed)
+        lit = (exchange.direct.any((1, 2)) | (np.diff(exchange.ends.start) > 0)).sum()
+        return Between(cells, exchange) if exchange.weight.sum() > LEAST * lit else None
+
+
 def make_exchange(scene: Scene, cells: Cells, environments: list[Environment], seed: int) -> Exchange:
     """Trace what the sides of the cells receive directly, and where their blocked rays end.
 

@@ -149,11 +149,21 @@ def light_transport(
     Returns:
         One Transport a light, (P, ...) float32, linear radiance for a white surface.
     """
+    return transport_and_ends(scene, points, environments, quality, seed)[0]
+
+
+def transport_and_ends(
+    scene: Scene, points: GBuffer, environments: list[Environment], quality: Quality, seed: int, cells: Cells | None = None
+) -> "tuple[list[Transport], Ends | None]":
+    """`light_transport`, and where the points' blocked rays end, if the surface is given in cells."""
     result: list[Transport] = []
+    ends = None
     for first in range(0, len(environments), MAX_LIGHTS):
         lights = cached_light_set(tuple(environments[first : first + MAX_LIGHTS]))
-        result += integrate(scene, points, lights, quality, seed)
-    return result
+        some, found = integrate_with_ends(scene, points, lights, quality, seed, None if first else cells)
+        result += some
+        ends = ends or found
+    return result, ends
 
 
 KEPT = 8

@@ -101,7 +101,7 @@ def write_conditions(folder: Path, views: int = 4, size: int = 24, profile: str 
         folders = [view_folder(view), *([f"{view_folder(view)}/{SD}"] if profile == SD else [])]
         files += [f"{place}/{name}.exr" for place in folders for name in ("geometry", *LIGHTS)]
     extra = {"environments": list(LIGHTS), "views": views, "knots": list(KNOTS), "clamped": {}, "profile": profile}
-    extra |= {"parts": PARTS, "shared_labels": []}
+    extra |= {"parts": PARTS, "shared_labels": [], "bounces": 0}
     extra["to_world"] = [x / extent for x in identity()[:-1]] + [1.0]
     write_manifest(folder, CONDITIONS, Provenance(made.options, 0, made.inputs, extra), files)
     return folder

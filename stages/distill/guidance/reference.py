@@ -13,6 +13,7 @@ from stages.core.artifact import sha256_file
 from stages.core.errors import InputError
 from stages.core.shading import Material, shade
 from stages.distill import schedule
+from stages.distill.bounces import Bounces
 from stages.distill.guidance.base import Budget, Response
 from stages.distill.sampling import PixelSampler, Sample
 from stages.light.textured_model import TexturedModel
@@ -81,6 +82,16 @@ class ReferenceGuidance:
         gradient, curvature = weight * residual / shown, weight / shown.square()
         plain = PLAIN * schedule.plain(progress)
         return Response(gradient.flatten(0, 1), float(residual.abs().mean()), curvature.flatten(0, 1), plain)
+
+
+ASIDE = 0.01
+"""How far from a cell it is looked at, world units."""
+
+
+def material_of(asset: TexturedModel, cells: Bounces) -> Tensor:
+    """The known material of the cells of light between surfaces, (C, 5)."""
+    points, eyes = cells.points.numpy(), (cells.points + ASIDE * cells.normals).numpy()
+    return torch.from_numpy(asset.material_at(points, eyes)[0])
 
 
 def _target_radiance(sampler: PixelSampler, truth: Tensor) -> Tensor:
