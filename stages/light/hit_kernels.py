@@ -1,4 +1,4 @@
-"""Points, normals and ray origins on triangles, compiled; `stages.light.hit_reference` is the plain form of the same, to the bit.
+"""Points, normals and ray origins on triangles, compiled; `stages.light.hit_reference` is their plain form, to the bit.
 
 triangle: (P,). weights: (P, 3) barycentric. vertices: (V, 3), triangles: (F, 3), normals: (F, 3, 3) of corners, flat: (F, 3)
 of triangles; float32, summed in float64. result: (P, 3) float32, written.

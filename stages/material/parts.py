@@ -19,7 +19,8 @@ HEADS = ("blade", "blades", "head")
 SPOUTS = ("spout",)
 GUARDS, POMMELS = ("guard", "crossguard", "cross-guard", "tsuba", "quillons", "bolster"), ("pommel",)
 ENDS = ("end",)
-SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS)
+WHEELS = ("wheel", "wheels", "tyre", "tyres", "tire", "tires", "castors", "casters")
+SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS, *WHEELS)
 """Names of parts that are looked for in the shape of a thing."""
 
 SAMPLED, NEAR = 3000, 160
@@ -56,6 +57,8 @@ def found(mask: Mask, surface: Surface) -> Mask | None:
         return None
     if word in LEGS:
         return _thin_pieces(mask, surface) or _under(mask, surface)
+    if word in WHEELS:
+        return _wheels(mask, surface)
     if word in ENDS:
         return _at_end(mask, surface)
     if word in GUARDS + POMMELS:
@@ -94,6 +97,25 @@ def _thin_pieces(mask: Mask, surface: Surface) -> Mask | None:
     legs = [k for k in stands if np.median(thin[some.piece == k]) < THIN]
     share = np.isin(surface.piece, legs).mean()
     return replace(mask, kind="pieces", pieces=tuple(legs), level=0.5) if legs == stands and 0 < share < 0.6 else None
+
+
+ALIKE, FLAT = 0.12, 0.75
+"""By how much a wheel's height and length differ at most, as a share, and how thick it is beside them."""
+
+
+def _wheels(mask: Mask, surface: Surface) -> Mask | None:
+    """Pieces that stand on the floor, as long as they are high and less thick than that, two or more."""
+    floor = surface.point[:, 2].min() + FLOOR
+    wheels = []
+    for k in (int(row) for row in np.unique(surface.piece) if row > 0):
+        points = surface.point[surface.piece == k]
+        across, high = sorted(np.ptp(points[:, :2], 0)), float(np.ptp(points[:, 2]))
+        middle = (points.max(0) + points.min(0)) / 2
+        radius = np.linalg.norm(np.delete(points - middle, int(np.ptp(points[:, :2], 0).argmin()), 1), axis=1)
+        round_ = radius.max() < 0.5 * (1 + ALIKE) * high  # the corners of a box are farther away
+        if points[:, 2].min() < floor and abs(across[1] - high) < ALIKE * high and across[0] < FLAT * high and round_:
+            wheels.append(k)
+    return replace(mask, kind="pieces", pieces=tuple(wheels), level=0.5) if len(wheels) > 1 else None
 
 
 def _under(mask: Mask, surface: Surface) -> Mask | None:

@@ -59,8 +59,8 @@ MUG = [tube(0.25, -0.3, 0.3), ring((0.25, 0, 0), 0.15, 0.03)]
 
 
 PIECES = Pieces(
-    np.zeros((6, 3), np.float32), np.repeat(np.eye(3, dtype=np.float32)[None], 6, 0), np.zeros(6, np.float32),
-    np.repeat(np.array([[0, 0, 1]], np.float32), 6, 0),
+    np.zeros((8, 3), np.float32), np.repeat(np.eye(3, dtype=np.float32)[None], 8, 0), np.zeros(8, np.float32),
+    np.repeat(np.array([[0, 0, 1]], np.float32), 8, 0),
 )  # fmt: skip
 
 
@@ -124,3 +124,22 @@ def test_one_end_is_a_quarter_of_a_long_thing(lies: bool) -> None:
     end = surface(beam)
     along = end.point[:, 0 if lies else 2]
     assert ((covered(end, "end") > 0.5) == (along > 0.25)).mean() > 0.99
+
+
+def disc(centre: tuple[float, ...], radius: float, thick: float) -> tuple[np.ndarray, np.ndarray]:
+    """A wheel that rolls along x: its rim and its two faces."""
+    angle, y = RNG.random(1500) * 2 * np.pi, RNG.uniform(-0.5, 0.5, 1500) * thick
+    out = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], 1)
+    inner = np.sqrt(RNG.random(1500))[:, None] * radius * out
+    side = np.where(RNG.random(1500) < 0.5, 1.0, -1.0)[:, None] * np.array([0, 1, 0])
+    rim = radius * out + y[:, None] * np.array([0, 1, 0])
+    return np.array(centre) + np.concatenate([rim, inner + 0.5 * thick * side]), np.concatenate([out, side])
+
+
+def test_wheels_are_the_round_pieces_on_the_floor() -> None:
+    body = box((-0.5, -0.2, -0.1), (0.5, 0.2, 0.2))
+    crate = box((-0.1, -0.05, -0.2), (0.1, 0.05, 0.0))  # stands on the floor, too, as long as it is high
+    wheels = [disc((x, y, -0.1), 0.1, 0.06) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
+    car = surface(body, crate, *wheels, apart=True)
+    assert ((covered(car, "tyres") > 0.5) == (car.piece > 2)).all()
+    assert covered(surface(body, crate, apart=True), "wheels").max() > 0.5  # where words alone put them
