@@ -19,16 +19,18 @@ from stages.bake.raster import Layout, touched_texels
 from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
 from stages.core.artifact import Artifact
 from stages.core.color import srgb_encode
-from stages.core.frames import camera_rays
+from stages.core.frames import camera_rays, tangent_frame
 from stages.core.images import labelled
 from stages.core.parallel import in_parallel
 from stages.core.texture_sets import triangle_sets
 from stages.core.tiles import repeats
 from stages.light.environment import Environment
+from stages.light.exchange import Between
 from stages.light.gbuffer import GBuffer, facing, surface_points
 from stages.light.known import reflected
 from stages.light.lights import preview_light
 from stages.light.lookup import CLAMP, REPEAT, look_up
+from stages.light.own_light import Thrown
 from stages.light.scene import Hits, Scene
 from stages.light.transport import Quality, cached_light_set
 
@@ -75,16 +77,17 @@ class Picture:
         return mean * self.covered + (1 - self.covered) * background
 
 
-def contact_sheet(look: "Look", size: int) -> NDArray[np.float32]:
+def contact_sheet(look: "Look", size: int, bounces: int = 0) -> NDArray[np.float32]:
     """Draw the preview.
 
     Args:
-        size: pixels along each edge of one view.
+        size: pixels along each edge of one view. bounces: of light between surfaces.
     Returns:
         (rows, columns, 3) encoded sRGB in [0, 1].
     """
     light, scene = preview_light(), look.scene
     cached_light_set((light,))  # once, not in every thread
+    look = replace(look, thrown=look.throws(light, bounces)) if bounces else look
     drawn = in_parallel(lambda c2w: draw_view(look, light, c2w, size), cameras(scene.vertices, scene.triangles))
     cells = [srgb_encode(picture.over(backdrop(size))) for picture in drawn]
     named = "albedo.png" if len(look.maps) == 1 else "albedo of each set"
@@ -96,13 +99,15 @@ def contact_sheet(look: "Look", size: int) -> NDArray[np.float32]:
 class Look:
     """A mesh and its textures.
 
-    uv: (F, 3, 2), v down. maps: (H, W, 5) of each texture set. of_triangle: (F,) row of its maps.
+    uv: (F, 3, 2), v down. maps: (H, W, 5) of each texture set. of_triangle: (F,) row of its maps. thrown: what it throws on
+    itself under the light that it is drawn in, or None.
     """
 
     scene: Scene
     uv: NDArray
     maps: list[NDArray[np.float32]]
     of_triangle: NDArray[np.int32]
+    thrown: Thrown | None = None
     wraps: list[int] = field(init=False)  # how the textures go on beyond their edges, as in model.glb
 
     def __post_init__(self) -> None:
@@ -123,6 +128,16 @@ class Look:
             mine, wrap = np.flatnonzero(row == number), self.wraps[number]
             result[mine] = look_up(self.maps[number], middle[mine], edges[mine], (wrap, wrap))[:, :5]
         return result
+
+    def throws(self, light: Environment, bounces: int) -> Thrown | None:
+        """What it throws on itself under a light; None where it sees next to nothing of itself."""
+        between = Between.of(self.scene, [light], 0)
+        if between is None:
+            return None
+        sides = between.cells.sides(self.scene)
+        across = np.stack(tangent_frame(sides.ng), 1) * between.cells.width
+        material = self.material(sides, edges(self.scene, sides.triangle, across))
+        return Thrown(between.cells, between.exchange.solved(material, bounces), between.exchange.sky)
 
     def points(
         self, hits: Hits, directions: NDArray, mask: NDArray[np.bool_], c2w: NDArray, step: float
@@ -202,7 +217,7 @@ def _draw(
         values = look.material(points, across)
         alpha[mask], material[mask] = 1, values
         values[:, 3] = rougher(values[:, 3], spread)
-        radiance = reflected(look.scene, points, list(lights), values, RAYS, seed=0)  # (lights, P, 3)
+        radiance = reflected(look.scene, points, list(lights), values, RAYS, 0, look.thrown)  # (lights, P, 3)
         if look.scene.emission is not None:
             radiance += look.scene.emission.at(points.triangle, points.barycentric, across)
         colors[mask] = np.concatenate(np.float32(EXPOSURE) * radiance, 1)
@@ -219,20 +234,27 @@ def footprint(scene: Scene, points: GBuffer, directions: NDArray, c2w: NDArray, 
     Returns:
         (P, 2, 3).
     """
-    a, b, c = (scene.vertices[scene.triangles[points.triangle, k]].astype(np.float64) for k in range(3))
-    first, second = b - a, c - a
-    normal = np.cross(first, second)
-    squared = (normal**2).sum(1)
-    sound = squared > 0
     depth = points.depth[points.mask][:, None].astype(np.float64)
     towards = (directions * points.ng).sum(1, keepdims=True)
     least = np.linalg.norm(directions, axis=1, keepdims=True) / STRETCH
     towards = -np.maximum(np.abs(towards), least)  # ng faces the viewer
-    result = np.zeros((len(depth), 2, 3), np.float32)
+    moved = np.empty((len(depth), 2, 3))
     for axis in (0, 1):
         aside = np.broadcast_to(c2w[:3, axis] * step, directions.shape)
-        moved = depth * (aside - directions * (aside * points.ng).sum(1, keepdims=True) / towards)
-        along = np.stack([np.cross(moved, second), np.cross(first, moved)], 1)  # (P, 2, 3)
+        moved[:, axis] = depth * (aside - directions * (aside * points.ng).sum(1, keepdims=True) / towards)
+    return edges(scene, points.triangle, moved)
+
+
+def edges(scene: Scene, triangle: NDArray, across: NDArray) -> NDArray[np.float32]:
+    """Vectors in the planes of triangles in barycentric coordinates. Args: (P,), (P, 2, 3). Returns: (P, 2, 3)."""
+    a, b, c = (scene.vertices[scene.triangles[triangle, k]].astype(np.float64) for k in range(3))
+    first, second = b - a, c - a
+    normal = np.cross(first, second)
+    squared = (normal**2).sum(1)
+    sound = squared > 0
+    result = np.zeros(across.shape, np.float32)
+    for axis in (0, 1):
+        along = np.stack([np.cross(across[:, axis], second), np.cross(first, across[:, axis])], 1)  # (P, 2, 3)
         weights = np.einsum("pkd,pd->pk", along, normal) / np.where(sound, squared, 1)[:, None] * sound[:, None]
         result[:, axis] = np.c_[-weights.sum(1), weights]
     return result

@@ -356,7 +356,7 @@ def write_asset(
     size, look = int(made.options["preview_size"]), shown_look(subject, shown)
     progress("preview", 0, 1)
     with beside(lambda: page_of(subject.mesh, made, look, [one.facts for one in shown], size)) as page:
-        files, notes = write_models(out, subject, shown, look, size)
+        files, notes = write_models(out, subject, shown, look, size, made.extra.get("bounces", 0))
     files += [keep_mesh(out, prep), *kept]
     progress("report", 0, 1)
     write_page(out / "report.html", page.result(), files)
@@ -380,12 +380,12 @@ def keep_mesh(out: Path, prep: Path) -> str:
 
 
 def write_models(
-    out: Path, subject: Subject, shown: list[Shown], look: Look, preview_size: int
+    out: Path, subject: Subject, shown: list[Shown], look: Look, preview_size: int, bounces: int
 ) -> tuple[list[str], dict[str, int]]:
     """Write models and preview of texture sets that are written.
 
     Args:
-        look: what the preview shows.
+        look: what the preview shows. bounces: of light between surfaces, there.
     Returns:
         the files' names, textures too; what the models could not hold.
     """
@@ -400,7 +400,7 @@ def write_models(
     if mesh.provenance.extra["source_format"] == "obj":
         write_obj(out / "model.obj", mesh, relief)
         files += ["model.obj", "model.mtl"]
-    write_png(out / "preview.png", contact_sheet(look, preview_size))
+    write_png(out / "preview.png", contact_sheet(look, preview_size, bounces))
     return [*files, "preview.png", *write_studio(out, mesh, preview_size)], model.notes
 
 
@@ -417,6 +417,7 @@ def describe(mesh: Artifact, made: Artifact) -> dict[str, Any]:
     return {
         **{key: source[key] for key in ("source_name", "source_format", "uv_kept", "findings")},
         **{key: material[key] for key in ("prompt", "parts", "guidance", "environments")},
+        **{key: material[key] for key in ("bounces",) if key in material},
         "distilled_with": {key: made.provenance.options[key] for key in SAID_OF_OPTIONS if key in made.provenance.options},
         "material_slots": list(dict.fromkeys(part["material"] for part in source["parts"])),
     }

@@ -144,7 +144,7 @@ MATERIAL = Schema(
     },
     # recipe: as `material.recipe` writes it; residual: ResidualConfig as a dict; prompt; guidance: name and what identifies its
     # model; environments: names used; extent: longest edge of the object in units of its source; parts: {"name", "prompt"} of
-    # those that have prompts of their own
+    # those that have prompts of their own; bounces: of light between surfaces, where there are any
     extra=("recipe", "residual", "prompt", "parts", "guidance", "environments"),
 )
 

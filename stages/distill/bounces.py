@@ -31,10 +31,11 @@ class Bounces:
     """Light between surfaces of a finished conditions folder.
 
     points, normals: (C, 3), where the material of each cell is asked for; label: (C,) int64; footprint: (C,).
+    count: of bounces.
     """
 
     def __init__(self, folder: Path, files: Mapping[str, str], environments: list[str], bounces: int) -> None:
-        self._folder, self._files, self._bounces = folder, files, bounces
+        self._folder, self._files, self.count = folder, files, bounces
         arrays = load_npz(intact(folder, FILE, files), BOUNCES).arrays
         ends, sides = Ends.from_arrays(arrays), len(arrays["direct"])
         expected = (2 * len(arrays["cell_label"]), len(environments), 3)
@@ -52,7 +53,7 @@ class Bounces:
 
     def solved(self, material: Tensor) -> list[OwnLight]:
         """The light of an object whose cells are of these materials (C, 5), under each environment."""
-        own = self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self._bounces)
+        own = self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count)
         lights = zip(*(np.split(a, len(self._skies), 1) for a in (own.light, own.before, own.sent)), strict=True)
         return [OwnLight(own.bounces, own.material, *map(np.ascontiguousarray, light)) for light in lights]
 

@@ -460,4 +460,6 @@ def _write(run: Run) -> None:
     }
     extra = {**request.extra, "recipe": state.moves.moved(run.base.recipe).to_json(), "residual": state.residual.config_dict()}
     extra["extent"] = views.extent()
+    if views.bounces is not None:
+        extra["bounces"] = views.bounces.count
     save_npz(run.out, MATERIAL, arrays, Provenance(request.options, request.seed, request.inputs, extra))

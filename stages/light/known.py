@@ -17,6 +17,7 @@ from stages.core.knots import F0, KNOTS
 from stages.light import reconstruction
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
+from stages.light.own_light import Thrown, own_sums
 from stages.light.scene import Scene
 from stages.light.terms import Terms, between_cosines
 from stages.light.transport import Quality, cached_light_set, smoothed, trace
@@ -62,17 +63,22 @@ def reflected(
     material: NDArray[np.float32],
     quality: Quality,
     seed: int,
+    thrown: Thrown | None = None,
 ) -> NDArray[np.float32]:
     """Outgoing radiance of every point of a view under each environment, (lights, P, 3) linear.
 
     Args:
         environments: `stages.light.light_set.MAX_LIGHTS` at most. material: (P, 5) albedo, roughness, metallic. quality:
-        without further rays.
+        without further rays. thrown: what the object throws on itself under these environments, if that is to be seen.
     """
     assert not quality.extra, "rays are added where a view is noisy under lights of all materials"
     terms = known(material[:, 3], (points.n * points.wo).sum(-1).clip(0, 1))
     lights = cached_light_set(tuple(environments))
-    sums = trace(scene, points, lights, quality, seed, terms).of_lights(len(environments))
+    sums = trace(scene, points, lights, quality, seed, terms, cells=thrown and thrown.cells).of_lights(len(environments))
+    if thrown is not None and sums.ends is not None:
+        more = own_sums(points.n, points.wo, sums.ends, thrown.own, thrown.sky, terms.counts(quality.lobe), terms)
+        for values, added in zip((sums.mean, sums.variance), more, strict=True):
+            values[:, :, : added.shape[2]] += added
     if quality.smooth:
         sums.variance[terms.own < SHARP, 1:] = 0
         sums = replace(sums, mean=smoothed(sums, points, lights, reconstruction.Neighbours.of(points), terms))

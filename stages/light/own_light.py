@@ -6,7 +6,7 @@ What a point receives from the object is linear in what its other points send ou
 narrower than its few rays takes what the mirror shows. So the point's own albedo, metallic and roughness enter exactly.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from stages.core.frames import tangent_frame
 from stages.core.knots import KNOTS
 from stages.core.parallel import compiled, in_parallel, slices
+from stages.light.cells import Cells
 from stages.light.ends import STEPS, Ends
 from stages.light.leaving import POINTS_PER_TASK, OwnLight, Sky, arriving, mirrored
 from stages.light.terms import GLTF, Terms
@@ -24,6 +25,14 @@ if TYPE_CHECKING:
 
 NARROW, WIDE = 0.25, 0.5
 """Roughness up to which a lobe takes what the mirror shows, and from which on what its rays bring."""
+
+
+class Thrown(NamedTuple):
+    """What an object of known materials throws on itself under some environments."""
+
+    cells: Cells
+    own: OwnLight
+    sky: Sky
 
 
 def own_sums(

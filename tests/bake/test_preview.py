@@ -217,3 +217,19 @@ def test_a_large_picture_is_drawn_in_tiles_without_seams(monkeypatch: pytest.Mon
     cut = draw_view(look, preview_light(), view, 40)
     assert (whole.alpha == cut.alpha).all()
     assert np.abs(srgb_encode(whole.over(np.zeros(3, "f4"))) - srgb_encode(cut.over(np.zeros(3, "f4")))).max() < 8 / 255
+
+
+def test_what_the_object_throws_on_itself_is_drawn() -> None:
+    """A corner whose floor is red and whose walls are white: with bounces the walls are redder; a sphere draws as before."""
+    scene = scenes.box_in_corner()
+    uv = np.zeros((len(scene.triangles), 3, 2), "f4")
+    flat = np.abs(scene.geometric_normal(np.arange(len(uv)))[:, 2]) > 0.5
+    uv[:, :, 0] = np.where(flat, 0.25, 0.75)[:, None]
+    maps = np.array([[[0.8, 0.05, 0.05, 0.8, 0], [0.8, 0.8, 0.8, 0.8, 0]]], "f4").repeat(2, 0)
+    look, light, c2w = worn(scene, uv, maps), preview_light(), camera(scene.vertices.astype(float), 30, 25)
+    direct, bounced = (draw_view(replace(look, thrown=look.throws(light, b) if b else None), light, c2w, 48) for b in (0, 2))
+    walls = direct.alpha & (direct.material[..., 2] > 0.5)
+    red, blue = ((bounced.color - direct.color)[walls][:, channel].mean() for channel in (0, 2))
+    assert red > 1.3 * blue > 0 and bounced.color.max() < 1.5 * direct.color.max()
+    ball = scenes.sphere(3)
+    assert worn(ball, np.zeros((len(ball.triangles), 3, 2), "f4"), maps).throws(light, 2) is None
