@@ -25,7 +25,7 @@ def foretold(stage: str, options: Mapping[str, Any]) -> float:
     if stage == "distill":
         return 6.0 + 0.1 * (options["steps"] or 60)
     if stage == "bake":
-        return 15.0 + 38.0 * ((options["size"] or 2048) / 2048) ** 2
+        return 11.0 + 27.0 * ((options["size"] or 2048) / 2048) ** 2
     return 7.0
 
 

@@ -47,14 +47,15 @@ class Thing(NamedTuple):
 
 def preview(maps: Maps, size: int) -> NDArray[np.float32]:
     """Encoded sRGB, (3 size, 3 size, 3). Args: maps: of a tile. size: pixels along each edge of a picture."""
-    material, normal = (shrunk(a, max(size, 256)) for a in (maps.material, _normals(maps)))
+    shown, normal = shrunk(maps.material, size), shrunk(_normals(maps), max(size, 256))
+    material = shown if size >= 256 else shrunk(maps.material, 256)
     lights = [BUILTIN[name]() for name in LIGHTS]
     cached_light_set(tuple(lights))  # once, not in every thread
     rows = in_parallel(lambda thing: _pictures(thing, lights, material, normal, size), (sphere(), plate()))
-    albedo = srgb_encode(shrunk(maps.albedo, size))
+    albedo = srgb_encode(shown[..., :3])
     repeated = np.tile(srgb_encode(shrunk(maps.albedo, -(-size // 2))), (2, 2, 1))[:size, :size]
     close = srgb_encode(maps.albedo[:size, :size]) if len(maps.albedo) >= size else albedo
-    rough = np.repeat(shrunk(maps.material[..., 3:4], size), 3, 2)
+    rough = np.repeat(shown[..., 3:4], 3, 2)
     last = [repeated, close, rough]
     return np.concatenate([*(np.concatenate(row, 1) for row in rows), np.concatenate(last, 1)], 0).astype(np.float32)
 
