@@ -95,6 +95,8 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
     if token.value.kind == "show" and following.kind in ("comma", "end") and now.says_what:
         now.join = token.value  # "peeling paint, gray wood showing"
         return None
+    if token.value.kind == "peel" and following.kind == "part" and now.coats:
+        return None  # "gilding worn off at the edges"
     if token.value.kind in ("peel", "through") and following.kind in ("comma", "end", "join"):
         return None  # "blue paint peeling off, ..."
     if token.value.kind in ("show", "through") and following.kind == "part" and now.says_what:
@@ -163,7 +165,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         if early and phrase.join.kind in ("", "and"):
             return  # "a checkerboard marble plinth", "blue and white gingham cushion"
         phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "with a red gingham lid"
-    elif kind == "part" and text.startswith("around") and phrase.where in RINGS:
+    elif kind == "part" and text.startswith(("around", "along the")) and phrase.where in RINGS:
         region = token.value if token.value.share < BAND or token.value.kind == "middle" else token.value._replace(share=BAND)
         phrase.region, phrase.where, phrase.placed = region, text, phrase.says_what  # "a gold ring around the top"
     elif kind == "part" and phrase.where in SHAPES and (phrase.says_what or phrase.where.split(" ")[0] in PAINTS):

@@ -6,14 +6,14 @@ from itertools import pairwise
 from stages.prior.colors import CHANGES
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, is_hue
-from stages.prior.places import PARTS, SHAPES, Region
+from stages.prior.places import GATHERS, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import ROOFS
 from stages.prior.tokens import singulars
 
 
 def implied(phrases: list[Phrase]) -> None:
     """Say it, in place. Args: phrases: one or more."""
-    for step in (_alone, _listed, _bodies, _fronts, _shade, _scorch, _stuffs):
+    for step in (_alone, _listed, _bodies, _fronts, _sprinkles, _shade, _scorch, _stuffs):
         step(phrases)
 
 
@@ -49,6 +49,14 @@ def _fronts(phrases: list[Phrase]) -> None:
     for phrase in phrases:
         if phrase.where in ("knobs", "buttons") and not phrase.within:
             phrase.within = Phrase(region=Region("badge", 1.4), where="front")
+
+
+def _sprinkles(phrases: list[Phrase]) -> None:
+    """Sprinkles lie on the icing."""
+    for before, phrase in pairwise(phrases):
+        icing = gathering(before.substance) in ("icing", "frosting", "whipped cream")
+        if icing and "sprinkles" in phrase.where and not phrase.within:
+            phrase.within = Phrase(region=before.region or GATHERS[gathering(before.substance)], where=before.where or "icing")
 
 
 def _stuffs(phrases: list[Phrase]) -> None:

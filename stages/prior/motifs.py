@@ -12,8 +12,20 @@ from stages.prior.tokens import Join
 
 def grounded(phrases: list[Phrase]) -> list[Phrase]:
     """The phrases, each pattern after its ground."""
-    return _grounded(_marked(_checked(_painted(phrases))))
+    return _grounded(_marked(_checked(_painted(_on_color(phrases)))))
 
+
+
+def _on_color(phrases: list[Phrase]) -> list[Phrase]:
+    """A colour on which a pattern lies is that of the thing: "an easter egg with pink zigzags on mint green"."""
+    if len(phrases) < 3:
+        return phrases
+    first, marks, ground, *rest = phrases
+    bare = bool(first.thing) and not (any(map(is_hue, first.colors)) or first.animal or first.region)
+    hue = ground.join.kind == "on" and ground.color_only and not ground.region
+    if bare and hue and marks.where in SHAPES and marks.says_what:
+        return [replace(first, colors=[*ground.colors, *first.colors]), marks, *rest]
+    return phrases
 
 
 def _painted(phrases: list[Phrase]) -> list[Phrase]:

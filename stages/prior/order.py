@@ -7,7 +7,7 @@ from stages.prior.colors import COLORS
 from stages.prior.grammar import split
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
-from stages.prior.places import PARTS, PARTS_OF, PEELS, SHAPES, Region, gathering
+from stages.prior.places import DETAILS, PARTS, PARTS_OF, PEELS, SHAPES, Region, gathering
 from stages.prior.stuffs import KNOWN
 from stages.prior.tokens import Join
 
@@ -25,7 +25,7 @@ def ordered(phrases: list[Phrase]) -> Order:
         base += 1
     upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
     first, over = phrases[base], [*reversed(upper), *phrases[base + 1 :]]
-    for step in (in_its_places, _largest, _framed, _of_body, _told_after, _either_side, _bared, _smaller_last):
+    for step in STEPS:
         first, over = step(first, over)
     return first, over
 
@@ -73,13 +73,20 @@ ROOFING = frozenset(["thatch", "thatched", "roof tiles", "shingles", "slate tile
 """What lies on roofs when nobody says where."""
 
 
+def _is_all(phrase: Phrase) -> bool:
+    return phrase.region is not None and phrase.region.kind == "all"
+
+
 def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     """The body, where one is spoken of, is the base, and what was named first lies on top of it."""
-    at = next((k for k, p in enumerate(over) if p.region and p.region.kind == "all" and p.says_what), None)
+    whole = [_is_all(p) and p.says_what and not gathering(p.substance) for p in over]
+    at = whole.index(True) if True in whole else None
     if at is None:
         return first, over
     body, others = over[at], [*over[:at], *over[at + 1 :]]
-    if body.color_only and first.substance and not (first.colors or first.region):
+    if body.coats and first.substance and not (first.region or first.coats or first.substance in ROOFING):
+        return replace(body, thing=first.thing, shows=replace(first), weather=[*first.weather, *body.weather]), others
+    if body.color_only and (first.substance or first.unknown) and not (first.colors or first.region):
         return replace(first, colors=body.colors), others  # "a lacquer bowl, red inside, black outside"
     alone = bool(first.thing) and not (first.substance or first.colors or first.unknown)
     if alone:
@@ -180,7 +187,11 @@ def _bared(first: Phrase, over: list[Phrase]) -> Order:
 def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     """Parts of a thing that has them elsewhere than others. Args: thing: where the first does not name it."""
     places = PARTS_OF.get(thing or first.thing, {})
-    return first, [replace(p, region=places.get(p.where.split(" ")[-1], p.region)) if p.where else p for p in over]
+    for phrase in over:
+        for part in (phrase, phrase.within):
+            if part and part.where:
+                part.region = places.get(part.where.split(" ")[-1], part.region)
+    return first, over
 
 
 def _of_thing(phrase: Phrase) -> bool:
@@ -196,3 +207,37 @@ def _smaller_last(first: Phrase, over: list[Phrase]) -> Order:
         for k, phrase in zip(at, by_size, strict=True):
             over[k] = phrase
     return first, over
+
+
+def _dirt_last(first: Phrase, over: list[Phrase]) -> Order:
+    """What gathers lies on paint, whichever is named first: "mud on the hull and chipped paint"."""
+    paints = [p for p in over if p.coats and not (p.region or gathering(p.substance))]
+    dirt = [p for p in over if gathering(p.substance)]
+    if not (paints and dirt) or over.index(paints[-1]) < over.index(dirt[0]):
+        return first, over
+    return first, [p for p in over if p not in dirt] + dirt
+
+
+def _is_detail(phrase: Phrase) -> bool:
+    """Whether it is a part that no table knows."""
+    beside = phrase.join.kind in ("with", "and", "comma") and bool(phrase.part or phrase.thing)
+    return beside and not (gathering(phrase.substance) or (phrase.substance and family(phrase.substance) == "gem"))
+
+
+NARROWER = 0.4
+"""Share of the edges of which one says something that the next gets."""
+
+
+def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
+    """Of two that lie on edges the second has the sharpest ones only: "orange corners and worn metal edges"."""
+    at = [k for k, p in enumerate(over) if p.says_what and (p.region.kind == "edges" if p.region else _is_detail(p))]
+    for number, k in enumerate(at[1:], 1):
+        region = over[k].region or DETAILS
+        over[k] = replace(over[k], region=region._replace(share=region.share * NARROWER**number))
+    return first, over
+
+
+STEPS = (
+    in_its_places, _largest, _framed, _of_body, _told_after, _either_side, _bared, _smaller_last, _dirt_last, _edges_apart,
+)  # fmt: skip
+"""What orders phrases, one after the other."""

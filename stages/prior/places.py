@@ -36,8 +36,8 @@ PARTS = _places("part")
 """Parts of things that name a region."""
 
 WORN = frozenset([
-    "chest", "shirt", "tunic", "vest", "jacket", "sweater", "robe", "breastplate", "trousers", "pants", "jeans", "shorts",
-    "skirt", "boots", "shoes", "sneakers", "sandals", "panel", "panels",
+    "chest", "armour", "armor", "shirt", "tunic", "vest", "jacket", "sweater", "robe", "breastplate", "trousers", "pants",
+    "jeans", "shorts", "skirt", "boots", "shoes", "sneakers", "sandals", "panel", "panels",
 ])  # fmt: skip
 """Parts that are things of their own unless another thing has them: "an orc with brown boots"."""
 
@@ -66,6 +66,10 @@ PARTS_OF = _of_things(
     ("armchair, sofa, couch, settee, ottoman, lounge chair", {"upholstery": PARTS["body"], "cushions": Region("up", 0.45)}),
     ("house, cottage, stone cottage, building, villa, church, chapel, shop, cabin, hut, barn, townhouse",
      {"door": Region("badge", 0.25), "doors": Region("badge", 0.25)}),
+    ("mushroom, toadstool, fly agaric, fly agaric mushroom", {"cap": Region("above", 0.45), "stem": Region("below", 0.55)}),
+    ("staff, wizard staff, wand, sceptre, scepter, lighthouse, obelisk, lamp post", {"top": Region("above", 0.14)}),
+    ("handbag, purse, shoulder bag, clutch",
+     dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
     ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
     ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
      {"roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3),

@@ -197,6 +197,8 @@ class Reading:
         gathers = GATHERS.get(gathering(phrase.substance))
         if gathers and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", min(0.45, gathers.share) if gathers.kind == "up" else 0.45, gathers.size, gathers.wear)
+        if gathers and phrase.region and phrase.region.kind == "all":
+            return gathers  # "ivy climbing the walls"
         if phrase.region:
             return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region
         if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):
@@ -385,6 +387,8 @@ class Reading:
         own = self._coat(phrase)
         if own.look == "enamel":
             return self._named("black iron")
+        if phrase.substance in GILT:
+            return replace(self._named("clay"), color=BOLE, said="bole")
         family = KNOWN[phrase.substance][0].family if phrase.substance else ""
         if family == "paint" or own.look in ("paint", "car paint", "painted wood"):
             made = split(OBJECTS[phrase.thing].made)[0] if phrase.thing else Phrase()
@@ -465,6 +469,9 @@ def _once(layers: list[Layer]) -> list[Layer]:
     """No layer twice."""
     return list({(layer.coat.look, layer.coat.color, layer.masks): layer for layer in reversed(layers)}.values())[::-1]
 
+
+GILT, BOLE = ("gilded", "gilt", "gilding", "gold leaf", "gold foil"), (0.42, 0.16, 0.11)
+"""What lies on red clay, and its sRGB: bole, on which gilders lay leaf."""
 
 MARBLING = 0.4
 """How much of white lighter the veins are of what is only called marbled."""

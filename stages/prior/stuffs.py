@@ -59,7 +59,8 @@ ROOFS = {
 }  # fmt: skip
 """What a roof is laid of, where words name its stuff."""
 
-COATINGS = frozenset(words("plaster, stucco, enamel, gold leaf, gold foil, varnish, glaze, lacquer, black lacquer, gilding"))
+COATINGS = frozenset(words("plaster, stucco, enamel, gold leaf, gold foil, varnish, glaze, lacquer, black lacquer, gilding, "
+"gilded, gilt"))
 """Thin coats that are no paint."""
 
 FINISH_LOOKS = {

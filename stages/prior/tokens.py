@@ -138,6 +138,8 @@ SIMILES = (
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
     (r"\b(?:burnt|burned|scorched|charred|soot) and blackened\b", "charred"),
     (r"\bblackened (?=at|on|along|around|near|in)", "charred "),
+    (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
+    (r"\bblue and white (?=willow)", ""),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
     (r"\b([a-z]+) and ([a-z]+) marbled\b", r"\1 and \2 swirled"),
     (r"\b(?:8|number eight)[ -]?ball\b", "eight ball"),
@@ -323,6 +325,8 @@ def _resolved(found: list[Token]) -> list[Token]:
         names = {t.kind for t in ahead} & {"substance", "thing"}
         if token.text == "left" and ahead and ahead[0].kind in ("finish", "weather"):
             continue  # "left unglazed"
+        if token.text in ("straw", "reed", "reeds") and any(t.text.startswith("thatch") for t in (*behind, *ahead)):
+            continue  # "thatched straw"
         if token.kind == "thing" and ahead and ahead[0].text in COLORS and any(t.kind == "thing" for t in result):
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
@@ -333,6 +337,8 @@ def _resolved(found: list[Token]) -> list[Token]:
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)
             if token.text in KNOWN and KNOWN[token.text][0].family != "gem":
                 names -= {"thing"}  # "an ivory comb", but "an emerald car"
+            elif token.text in KNOWN and ahead and _is_jewel(ahead[0]):
+                names = set()  # "an emerald brooch"
             if names or shaped or any(t.kind == "substance" for t in behind):
                 token = Token("color", token.text)
         if token.kind == "color" and token.article and not ahead and token.text in OBJECTS:
@@ -351,6 +357,12 @@ def _resolved(found: list[Token]) -> list[Token]:
 
 BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beetle", "armadillo")
 """Beasts with a shell."""
+
+
+def _is_jewel(token: Token) -> bool:
+    """Whether a thing is made of precious metal and small."""
+    thing = OBJECTS.get(token.text) if token.kind == "thing" else None
+    return bool(thing) and thing.metres < 0.25 and thing.made.split(" ")[-1] in ("gold", "silver", "platinum")  # type: ignore[union-attr]
 
 
 def _is_stuff(token: Token, ahead: list[Token], behind: list[Token]) -> bool:
