@@ -52,11 +52,11 @@ def normal_8bit(normal: NDArray[np.float32]) -> NDArray[np.uint8]:
     return byte
 
 
-def write_textures(folder: Path, maps: Maps, grey: bool, of: TextureSet = ONE_SET) -> list[str]:
+def write_textures(folder: Path, maps: Maps, of: TextureSet = ONE_SET, grey: bool = False) -> list[str]:
     """Write the masters and PNGs of the maps there are, several at a time.
 
     Args:
-        of: the set by which files are named. grey: also roughness.png and metallic.png, which MTL asks for.
+        of: the set by which files are named. grey: also roughness.png and metallic.png.
     Returns:
         the files' names.
     """

@@ -1,7 +1,7 @@
 """Writer of Wavefront OBJ and MTL: the source's numbers, polygons, objects and groups, with its own UVs or the new ones.
 
-Physically based slots (map_Pr, map_Pm) as Blender and Assimp read them: one grey picture each, so roughness and
-metallic are written apart from orm.png.
+Physically based slots (map_Pr, map_Pm) as Blender and Assimp read them: one grey picture each, the EXR masters, which are
+linear by their format: Blender takes PNGs for sRGB, and shows them too smooth.
 """
 
 from pathlib import Path
@@ -14,7 +14,7 @@ from stages.asset.worn import Worn, worn_materials
 from stages.core.artifact import Artifact, write_text
 from stages.core.texture_sets import TextureSet, texture_sets
 
-TEXTURES = {"map_Kd": "albedo.png", "map_Pr": "roughness.png", "map_Pm": "metallic.png"}
+TEXTURES = {"map_Kd": "albedo.png", "map_Pr": "roughness.exr", "map_Pm": "metallic.exr"}
 """By their plain names, see `core.texture_sets`."""
 
 

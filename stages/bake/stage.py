@@ -278,7 +278,7 @@ def write_set(out: Path, subject: Subject, maps: Maps, progress: Progress) -> Sh
     progress("files", 0, 1)
     mesh, part = subject.mesh, subject.set.share
     with beside(lambda: Facts.of(maps.material, subject.touched, islands(mesh, subject.triangles), part)) as facts:
-        files = write_textures(out, maps, mesh.provenance.extra["source_format"] == "obj", subject.set)
+        files = write_textures(out, maps, subject.set)
     normal = None if maps.normal is None else means(maps.normal, subject.block)
     return Shown(subject.set, files, means(maps.material, subject.block), normal, maps.occlusion is not None, facts.result())
 

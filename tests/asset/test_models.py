@@ -225,7 +225,7 @@ def test_obj_is_written_back_with_its_polygons_and_its_numbers(tmp_path: Path) -
     np.testing.assert_array_equal(source.normals[source.loop_normal], normals)
     text = (tmp_path / "model.mtl").read_text()
     assert "newmtl red paint" in text and "newmtl material" in text
-    for line in ("map_Kd albedo.png", "map_Pr roughness.png", "map_Pm metallic.png"):
+    for line in ("map_Kd albedo.png", "map_Pr roughness.exr", "map_Pm metallic.exr"):
         assert text.count(line) == 2
 
 

@@ -61,8 +61,7 @@ def blank(page: Path, *args: object) -> None:
 def test_each_set_has_its_files_and_the_manifest_lists_them(assets: Path) -> None:
     provenance, files = read_manifest(assets / "sets", ASSET)
     assert texture_sets(provenance) == [replace(one, size=512) for one in SETS]
-    names = ("albedo", "roughness", "metallic")
-    plain = {f"{name}.{ending}" for name in names for ending in ("exr", "png")} | {"occlusion.exr", "orm.png"}
+    plain = {f"{name}.exr" for name in ("albedo", "roughness", "metallic", "occlusion")} | {"albedo.png", "orm.png"}
     found = [map_files(one, files) for one in SETS]
     assert [set(of) for of in found] == [plain, plain]
     others = {f"model.{ending}" for ending in ("glb", "obj", "mtl")} | {f"preview.{ending}" for ending in ("png", "json")}
@@ -101,7 +100,7 @@ def test_the_model_has_a_material_for_each(assets: Path) -> None:
         stored = glb.view(glb.root["images"][texture["source"]]["bufferView"])
         assert stored == (assets / "sets" / SETS[number].file("albedo.png")).read_bytes()
     mtl = (assets / "sets" / "model.mtl").read_text()
-    assert "newmtl shell\n" in mtl and "map_Kd albedo_shell.png" in mtl and "map_Pm metallic.1002.png" in mtl
+    assert "newmtl shell\n" in mtl and "map_Kd albedo_shell.png" in mtl and "map_Pm metallic.1002.exr" in mtl
     assert [line for line in (assets / "sets" / "model.obj").read_text().splitlines() if line.startswith("usemtl")] == [
         "usemtl shell", "usemtl visor",
     ]  # fmt: skip

@@ -63,7 +63,7 @@ def constant_asset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_all_files_are_there_and_the_manifest_knows_their_hashes(constant_asset: Path) -> None:
     folder = constant_asset / "asset"
     provenance, files = read_manifest(folder, ASSET)
-    obj = {"roughness.png", "metallic.png", "model.obj", "model.mtl"}
+    obj = {"model.obj", "model.mtl"}
     assert set(files) == TEXTURES | obj | {
         "model.glb", "preview.png", "preview.json", "preview_light.exr", "report.html", "mesh.npz",
     }  # fmt: skip
