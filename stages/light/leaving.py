@@ -143,11 +143,12 @@ def _between(table, x):  # type: ignore[no-untyped-def]
 def _look_up(sky, place, roughness, out):  # type: ignore[no-untyped-def]
     """Radiance of all environments along a direction, blurred by a roughness. Args: place: of `Ends`, two whole numbers."""
     f32 = np.float32
-    level = roughness * f32(len(ROUGHNESS) - 1)
-    low = min(int(level), len(ROUGHNESS) - 2)
+    low = min(int(roughness * f32(len(ROUGHNESS) - 1)), len(ROUGHNESS) - 2)
+    least, most = f32(ROUGHNESS[low] ** 4), f32(ROUGHNESS[low + 1] ** 4)  # a lobe's variance goes as its alpha squared
+    between = min(max((roughness**4 - least) / (most - least), f32(0)), f32(1))
     out[:] = 0
     for k in range(2):
-        share = level - f32(low) if k else f32(1) - (level - f32(low))
+        share = between if k else f32(1) - between
         if share <= f32(0):
             continue
         size = SIZES[low + k]
