@@ -101,7 +101,7 @@ def paint(at: Place) -> Look:
 
 def car_paint(at: Place) -> Look:
     """Clear coat over an even red base: deep gloss, faint orange peel, swirls of washing, flakes that glint, a stone chip."""
-    flakes = Spectrum(0.0006, 0.0002, 1.2, tails=1.2, skew=0.5)
+    flakes = Spectrum(0.0008, 0.0003, 1.0, tails=0.7, skew=0.3)
     flake = fbm(at, flakes, 1)
     peel = fbm(at, Spectrum(0.006, 0.002, 0.6), 2)
     swirl = marks(at.flat, 0.06, 0.00012, 4, 0.0, 6.2, 3, 0.7, 0.35)
