@@ -1,8 +1,8 @@
 """Light between surfaces beside Mitsuba's path tracer: error of what shades a view, without bounces and with them.
 
 Each mesh is seen once, somewhat from above, in each of five materials. Ours is what distillation has: E, A and B of the view
-with what the object adds to them. The truth is `stages.report.path_tracer`, of the same BRDF, along the same rays, with paths
-of bounces + 2 segments; its direct light alone tells what else the two differ by. Errors are tone-mapped, x / (1 + x), over
+with what the object adds to them. The truth is `stages.report.path_tracer_worker`, of the same BRDF, along the same rays, with
+paths of bounces + 2 segments; its direct light alone tells what else the two differ by. Errors are tone-mapped, x / (1 + x), over
 the object's pixels, in percent.
 """
 
@@ -111,7 +111,7 @@ def path_traced(python: str, job: dict[str, NDArray]) -> NDArray[np.float64]:
     with tempfile.TemporaryDirectory() as folder:
         given, made = Path(folder) / "job", Path(folder) / "result"
         write_arrays(given, job)
-        script = Path(__file__).with_name("path_tracer.py")
+        script = Path(__file__).with_name("path_tracer_worker.py")
         done = subprocess.run([python, str(script), str(given), str(made)], capture_output=True, check=False)
         if done.returncode:
             said = done.stderr.decode(errors="replace").strip().splitlines() or ["it said nothing"]
