@@ -1,9 +1,9 @@
 """Light between surfaces beside Mitsuba's path tracer: error of what shades a view, without bounces and with them.
 
 Each mesh is seen once, somewhat from above, in each of five materials. Ours is what distillation has: E, A and B of the view
-with what the object adds to them. The truth is `stages.report.path_tracer_worker`, of the same BRDF, along the same rays, with
-paths of bounces + 2 segments; its direct light alone tells what else the two differ by. Errors are tone-mapped, x / (1 + x), over
-the object's pixels, in percent.
+with what the object adds to them. The truth is `stages.report.path_tracer_worker`, of the same BRDF, along the same rays,
+with paths of bounces + 2 segments; its direct light alone tells what else the two differ by. Errors are tone-mapped,
+x / (1 + x), over the object's pixels, in percent.
 """
 
 import subprocess
