@@ -15,7 +15,6 @@ def grounded(phrases: list[Phrase]) -> list[Phrase]:
     return _grounded(_marked(_checked(_painted(_on_color(phrases)))))
 
 
-
 def _on_color(phrases: list[Phrase]) -> list[Phrase]:
     """A colour on which a pattern lies is that of the thing: "an easter egg with pink zigzags on mint green"."""
     if len(phrases) < 3:

@@ -67,7 +67,7 @@ PARTS_OF = _of_things(
     ("house, cottage, stone cottage, building, villa, church, chapel, shop, cabin, hut, barn, townhouse",
      {"door": Region("badge", 0.25), "doors": Region("badge", 0.25)}),
     ("mushroom, toadstool, fly agaric, fly agaric mushroom", {"cap": Region("above", 0.45), "stem": Region("below", 0.55)}),
-    ("staff, wizard staff, wand, sceptre, scepter, lighthouse, obelisk, lamp post", {"top": Region("above", 0.14)}),
+    ("staff, wizard staff, wand, sceptre, scepter, lighthouse, obelisk", {"top": Region("above", 0.14)}),
     ("handbag, purse, shoulder bag, clutch",
      dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
     ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),

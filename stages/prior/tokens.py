@@ -136,7 +136,7 @@ SIMILES = (
      r"(?!coffee|water|blood|rust|grass|oil|wine|ink|tea|dirt)([a-z]+) stain\b", r", \1\2 coloured"),
     (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot)\b", r"with a \1\2 at the lower third"),
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
-    (r"\b(?:burnt|burned|scorched|charred|soot) and blackened\b", "charred"),
+    (r"\b(?:burnt|burned|scorched|charred) and blackened\b", "charred"),
     (r"\bblackened (?=at|on|along|around|near|in)", "charred "),
     (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
     (r"\bblue and white (?=willow)", ""),

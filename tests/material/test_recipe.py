@@ -193,3 +193,13 @@ def test_points_that_search_together_are_told_what_each_alone_is() -> None:
         together = lookup.shared(point, facing, np.arange(0, 1000, 20), group)
         np.testing.assert_allclose(together[0], alone.convexity, atol=2e-6)
         np.testing.assert_allclose(together[1], alone.occlusion, atol=2e-6)
+
+
+def test_white_leather_is_clean() -> None:
+    """Its colours differ less from their mean than those of brown leather do, each as a share of it."""
+    surface = Surface.bare(*(np.random.default_rng(0).random((2, 4000, 3)).astype(np.float32)), 1e-3)
+    spread = []
+    for color in ((0.36, 0.24, 0.14), (0.93, 0.93, 0.93)):
+        found = evaluate(Recipe(Coat("leather", color)), surface)[:, :3].mean(1)
+        spread.append(found.std() / found.mean())
+    assert 0 < spread[1] < 0.5 * spread[0]

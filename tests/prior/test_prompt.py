@@ -148,6 +148,21 @@ def test_what_the_whole_is_made_of_is_found(read, prompt: str, base: str) -> Non
     assert read(prompt).base.look == base
 
 
+def test_dirt_lies_on_paint_whichever_is_named_first(read) -> None:  # type: ignore[no-untyped-def]
+    looks = [layer.coat.look for layer in read("a crate with mud on the bottom and chipped green paint").layers]
+    assert looks[-1] == "cracked mud" and "paint" in looks[:-1]
+
+
+def test_two_trims_share_the_edges(read) -> None:  # type: ignore[no-untyped-def]
+    orange, metal = (layer.masks[0] for layer in read("a plastic crate with orange corners and steel edges").layers)
+    assert orange.kind == metal.kind == "edges" and 0 < metal.share < orange.share
+
+
+def test_gilding_shows_bole(read) -> None:  # type: ignore[no-untyped-def]
+    gilded, bole = read("a gilded picture frame with the gilding worn off at the edges").coats
+    assert gilded.metallic == 1 and not bole.metallic and bole.said == "bole"
+
+
 def test_what_is_smaller_lies_on_what_is_larger(read) -> None:  # type: ignore[no-untyped-def]
     one, other = (read(f"a steel sword with {parts}") for parts in ("a brass pommel and an oak grip",
     "an oak grip and a brass pommel"))
