@@ -34,12 +34,12 @@ from stages.light.own_light import with_own_light
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, Rays, cached_light_set, integrate_with_ends
 from stages.report.conditions import write_csv
-from stages.report.renderers import NEEDS, read_arrays, write_arrays
+from stages.report.renderers import NEEDS, pole_to_pole, read_arrays, write_arrays
 
 SIZE = 160
 """Pixels along each side of a view."""
 
-PIXELS, SAMPLES = 1500, 4096
+PIXELS, SAMPLES = 1500, 8192
 """Pixels that are compared, and their samples in Mitsuba, whose own noise is a few tenths of a percent."""
 
 FOV, AZIMUTH, ELEVATION, FRAME = np.radians(30.0), np.radians(35.0), np.radians(38.0), 0.8
@@ -87,8 +87,9 @@ def measure(python: str, mesh: str, scene: Scene, lights: Sequence[Environment],
         assert ends is not None
         for name, pair in MATERIALS.items():
             job = {name: getattr(scene, name) for name in ("vertices", "triangles", "normals")}
-            job |= {"origins": eye, "directions": -points.wo[some], "radiance": light.radiance, "samples": np.array(SAMPLES)}
-            job |= {"depths": np.array([2, bounces + 2]), "materials": np.array(pair), "plane": PLANE}
+            job |= {"origins": eye, "directions": -points.wo[some], "radiance": pole_to_pole(light.radiance)}
+            job |= {"samples": np.array(SAMPLES), "depths": np.array([2, bounces + 2])}
+            job |= {"materials": np.array(pair), "plane": PLANE}
             direct, exact = path_traced(python, job)
             own = exchange.solved(material(sides, pair), bounces)
             lit = with_own_light(transports[0], points.n, points.wo, ends, own, exchange.sky, counts)

@@ -5,6 +5,9 @@ Python environment, which knows nothing of this project: it reads and writes fol
 `stages.report.renderers` does. The material is glTF 2.0's, here as a BSDF of its own: Lambert's lobe
 reduced by Fresnel's, and GGX with alpha = r², height-correlated Smith and Schlick. Albedo, roughness and metallic are those of
 the one or the other of two materials, by the side of a plane on which a point lies.
+
+One convention is the project's and not the renderer's: where smooth normals turn away from a viewer in front of the triangle,
+they are bent back until N·V = `MIN_COSINE`. Mitsuba would light the point from behind the surface.
 """
 
 import sys
@@ -17,6 +20,10 @@ import numpy as np
 mi.set_variant("llvm_ad_rgb")
 
 F0 = 0.04
+
+MIN_COSINE = 1e-3
+"""As of `stages.core.albedo`."""
+
 BATCH = 64
 """Samples a pixel of one pass, which bounds memory."""
 
@@ -28,7 +35,8 @@ class Gltf(mi.BSDF):  # type: ignore[misc]
         mi.BSDF.__init__(self, properties)
         self.values = [[float(properties[f"v{i}{k}"]) for k in range(5)] for i in range(2)]
         self.plane = mi.Vector3f(*(float(properties[f"p{k}"]) for k in range(3)))
-        flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
+        flags = mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.DiffuseReflection
+        flags = flags | mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
         self.m_components = [flags]
         self.m_flags = flags
 
@@ -40,13 +48,25 @@ class Gltf(mi.BSDF):  # type: ignore[misc]
         roughness = dr.select(second, mi.Float(b[3]), mi.Float(a[3]))
         return color, roughness * roughness, dr.select(second, mi.Float(b[4]), mi.Float(a[4]))
 
+    def facing(self, si):  # type: ignore[no-untyped-def]
+        """A frame, in that of the surface, whose normal is the smooth one on the viewer's side, bent towards a viewer that it
+        turns away from."""
+        side = dr.select(dr.dot(si.n, si.to_world(si.wi)) >= 0, mi.Float(1), mi.Float(-1))
+        cosine = side * si.wi.z
+        across = dr.normalize(mi.Vector3f(0, 0, side) - cosine * si.wi)
+        bent = MIN_COSINE * si.wi + (1 - MIN_COSINE**2) ** 0.5 * across
+        return mi.Frame3f(dr.select(cosine < MIN_COSINE, bent, mi.Vector3f(0, 0, side)))
+
     def sample(self, ctx, si, sample1, sample2, active=True):  # type: ignore[no-untyped-def]
         """Half of the samples by the cosine, half by the visible normals."""
         _, alpha, metallic = self.material(si)
+        frame = self.facing(si)
+        wi = frame.to_local(si.wi)
         matt = dr.select(metallic < 1, mi.Float(0.5), mi.Float(0))
         lobe = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, alpha, True)
-        wm, _ = lobe.sample(si.wi, sample2)
-        wo = dr.select(sample1 < matt, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(si.wi, wm))
+        wm, _ = lobe.sample(wi, sample2)
+        wo = dr.select(sample1 < matt, mi.warp.square_to_cosine_hemisphere(sample2), mi.reflect(wi, wm))
+        wo = frame.to_world(wo)
         value, density = self.eval_pdf(ctx, si, wo, active)
         good = active & (density > 0)
         bs = mi.BSDFSample3f()
@@ -63,10 +83,12 @@ class Gltf(mi.BSDF):  # type: ignore[misc]
     def eval_pdf(self, ctx, si, wo, active=True):  # type: ignore[no-untyped-def]
         """BRDF times cosine, and the density of `sample`."""
         color, alpha, metallic = self.material(si)
-        n_v, n_l = mi.Frame3f.cos_theta(si.wi), mi.Frame3f.cos_theta(wo)
+        frame = self.facing(si)
+        wi, wo = frame.to_local(si.wi), frame.to_local(wo)
+        n_v, n_l = wi.z, wo.z
         active = active & (n_v > 0) & (n_l > 0)
-        wm = dr.normalize(si.wi + wo)
-        s = (1 - dr.dot(si.wi, wm)) ** 5
+        wm = dr.normalize(wi + wo)
+        s = (1 - dr.dot(wi, wm)) ** 5
         a2 = alpha * alpha
         q = wm.x * wm.x + wm.y * wm.y + a2 * wm.z * wm.z
         D = a2 / (dr.pi * q * q)
@@ -86,7 +108,7 @@ mi.register_bsdf("gltf", Gltf)
 def material(job: dict[str, np.ndarray]) -> dict:
     """The plugin's description."""
     values = {f"v{i}{k}": float(job["materials"][i, k]) for i in range(2) for k in range(5)}
-    return {"type": "twosided", "nested": {"type": "gltf", **values, **{f"p{k}": float(job["plane"][k]) for k in range(3)}}}
+    return {"type": "gltf", **values, **{f"p{k}": float(job["plane"][k]) for k in range(3)}}
 
 
 def view(job: dict[str, np.ndarray]) -> dict:

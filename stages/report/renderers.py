@@ -115,6 +115,17 @@ def read_arrays(folder: Path) -> dict[str, np.ndarray]:
     return {path.stem: np.load(path, allow_pickle=False) for path in folder.glob("*.npy")}
 
 
+def pole_to_pole(image: np.ndarray) -> np.ndarray:
+    """A light as Mitsuba's `envmap` reads it: its first and last rows lie on the poles, ours half a row away from them.
+
+    Bilinear look-ups are the same everywhere, for ours are linear between rows that are among those of the result.
+    Args: (H, W, 3). Returns: (2 H + 1, W, 3).
+    """
+    rows = np.repeat(image, 2, 0)
+    padded = np.concatenate([rows[:1], rows, rows[-1:]])
+    return ((padded[1:] + padded[:-1]) / 2).astype(np.float32)
+
+
 def mitsuba(given: str, made: str) -> None:
     """What runs inside of Mitsuba's environment."""
     import mitsuba as mi  # type: ignore[import-not-found]
@@ -128,7 +139,7 @@ def mitsuba(given: str, made: str) -> None:
             "mesh": mitsuba_mesh(mi, job),
             "light": {
                 "type": "envmap",
-                "bitmap": mi.Bitmap(job["radiance"]),
+                "bitmap": mi.Bitmap(pole_to_pole(job["radiance"])),
                 "to_world": mi.ScalarTransform4f([[0, 0, 1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]),
             },
             "sensor": {
