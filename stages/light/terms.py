@@ -96,9 +96,9 @@ GLTF = Terms(
     stored=2 * _K + 1,
     mirror=(1, 1 + _K),
     judged=(0, 1 + KNOTS.index(0.5), 1 + KNOTS.index(1.0)),
-    sharp=(2, 2 + _K),
-    joint=(*range(3, 1 + _K), *range(3 + _K, 1 + 2 * _K)),
-    highlights=tuple(range(KNOTS.index(0.16) - 1, KNOTS.index(0.65))),
+    sharp=(2, 3, 2 + _K, 3 + _K),
+    joint=(*range(4, 1 + _K), *range(4 + _K, 1 + 2 * _K)),
+    highlights=tuple(range(KNOTS.index(0.25) - 1, KNOTS.index(0.65))),
 )
 """E, A at every knot, B at every knot."""
 

@@ -13,7 +13,8 @@ every term, every roughness and every environment:
   prefiltered pyramid, at an eighth of the solid angle the ray stands for. The sum is divided by the sum of its own weights and
   multiplied by the exact unoccluded albedo, so an evenly lit open point has no error at all;
 - what rises above the bound (a sun, a lamp) has rays of its own, aimed at what the point would reflect most of, and
-  combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles;
+  combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles. What lobe rays
+  see of it is divided by their weights like the rest: a lobe narrower than a lamp shows little more than the lamp;
 - where nothing at all stands over the plane of a point's triangle, as on what is convex, no ray is traced
   (`stages.light.outermost`);
 - neighbouring pixels use complementary samples; the points that turn out noisiest trace more, towards the lights that make

@@ -504,7 +504,7 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, albedo, seen, where
                         if cell >= 0:
                             share = density[i] / (density[i] + light_density[texel, e] * aimed[p, cell])
                             for c in range(3 * e, 3 * e + 3):
-                                radiance[i, CHANNELS + c] = share * fine[texel, c]
+                                radiance[i, c] += share * fine[texel, c]
             for i in range(lobes, m):
                 share = density[i] / (density[i] + drawn_density[ray[i]])
                 for c in range(3):

@@ -10,6 +10,7 @@ from stages.core.shading import F0, KNOTS, Transport
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.light_set import light_set
+from stages.light.lights import BUILTIN
 from stages.light.reconstruction import Neighbours
 from stages.light.reference import reference_transport
 from stages.light.scene import Scene
@@ -143,3 +144,11 @@ def test_occlusion_is_that_there_is_a_hit(make) -> None:  # type: ignore[no-unty
     occluded, hit = scene.occluded(origins, directions), scene.intersect(origins, directions).mask
     assert 0.05 < occluded.mean() < 0.95
     assert (occluded != hit).sum() <= 1
+
+
+def test_a_narrow_lobe_shows_little_more_than_a_wide_lamp() -> None:
+    scene, light = scenes.sphere(4), BUILTIN["studio"]()
+    points = scenes.view_of(scene, 64)
+    (transport,) = light_transport(scene, points, [light], QUALITY["standard"], 0)
+    narrow = transport.A[:, 1] + transport.B[:, 1]  # a white lobe of roughness 0.08
+    assert narrow.max() < 1.5 * light.radiance.max()  # 1.37; what light rays add is not divided
