@@ -1,5 +1,7 @@
 """Light between surfaces in a conditions folder, and what distillation makes of it."""
 
+import shutil
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -8,6 +10,7 @@ import numpy as np
 import pytest
 import torch
 
+from dreammat_cli.main import main
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import conditions
 from stages.core.artifact import load_npz, read_manifest
@@ -122,3 +125,24 @@ def test_the_gradient_is_that_of_finite_differences(folder: Path) -> None:
         exact = ((up - down) / (2 * step)).numpy()
         error = np.sqrt(np.square(gradient[:, column].numpy() - exact).mean()) / np.sqrt(np.square(exact).mean())
         assert error < 0.02
+
+
+@pytest.mark.parametrize("name", ["bounces.npz", "view_000/bounces.npz"])
+@pytest.mark.parametrize("left", [0.0, 0.5], ids=["lost", "cut short"])
+def test_a_damaged_file_is_told_in_one_line(
+    folder: Path, tmp_path: Path, name: str, left: float, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    damaged = tmp_path / "conditions"
+    shutil.copytree(folder, damaged)
+    whole = (damaged / name).read_bytes()
+    (damaged / name).unlink()
+    if left:
+        (damaged / name).write_bytes(whole[: int(left * len(whole))])
+    asked = ["distill", damaged, "--prompt", "red clay", "-o", tmp_path / "m.npz", "--steps", "16", "--quiet"]
+    monkeypatch.setattr(sys, "argv", ["dreammat", *map(str, asked)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 4
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1 and name in said[0]
+    assert not (tmp_path / "m.npz").exists()
