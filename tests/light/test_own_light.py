@@ -48,9 +48,11 @@ def lit(transport: Transport, points: GBuffer, ends: Ends, own: OwnLight, exchan
     return with_own_light(transport, points.n, points.wo, ends, own, exchange.sky, GLTF.counts(STANDARD.lobe))
 
 
-def shaded(scene: Scene, points: GBuffer, light: Environment, values: tuple[float, ...], bounces: int) -> NDArray[np.float32]:
+def shaded(
+    scene: Scene, points: GBuffer, light: Environment, values: tuple[float, ...], bounces: int, count: int = FEW
+) -> NDArray[np.float32]:
     """Radiance (P, 3) of a scene of one material, of direct light and with the object's own."""
-    cells = Cells.of(scene, FEW)
+    cells = Cells.of(scene, count)
     transports, ends = integrate_with_ends(scene, points, cached_light_set((light,)), STANDARD, 0, cells)
     exchange = make_exchange(scene, cells, [light], 0)
     own = exchange.solved(everywhere(values).repeat(2 * len(cells), 0), bounces)
@@ -179,6 +181,26 @@ def test_coincident_faces_are_finite() -> None:
     scene = scenes.quads(floor, floor, floor[::-1], scenes.square(0, -0.5, -0.5, 0.5))
     direct, full = shaded(scene, scenes.view_of(scene, 16), scenes.even_light(), WHITE, 4)
     assert np.isfinite(full).all() and full.max() < 1.1 and (full >= direct).all()
+
+
+def test_touching_pieces_are_lit_as_the_one_that_they_make() -> None:
+    """A stepped pyramid of 56 cubes, whose inner faces touch, and without those: the same light between the steps."""
+    steps = [(x, y, layer) for layer, half in enumerate((3, 2, 1)) for x in range(-half, half) for y in range(-half, half)]
+    faces: dict[tuple[float, ...], list[NDArray]] = {}
+    for cube in steps:
+        for axis in range(3):
+            for k in (0, 1):
+                face = scenes.square(axis, cube[axis] + k, 0.0, 1.0)[:: 1 if k else -1]
+                face[:, [a for a in range(3) if a != axis]] += np.delete(cube, axis)
+                faces.setdefault((axis, *face.mean(0)), []).append(face / 6)
+    touching = scenes.quads(*(face for same in faces.values() for face in same))
+    outside = scenes.quads(*(same[0] for same in faces.values() if len(same) == 1))
+    assert len(steps) == 56 and len(touching.triangles) == 2 * 6 * 56 > len(outside.triangles)
+    parts, whole = (
+        shaded(scene, scenes.view_of(scene, 24), scenes.even_light(), WHITE, 4, 3000)[1] for scene in (touching, outside)
+    )
+    assert np.isfinite(parts).all() and np.percentile(parts, 99) < 1.05
+    assert percent(parts, whole) < 0.1
 
 
 def test_every_point_lies_in_its_cell() -> None:
