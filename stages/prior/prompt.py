@@ -245,7 +245,7 @@ class Reading:
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
         if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
-        if phrase.colors and phrase.where.split(" ")[-1] in ("sole", "soles", "outsole", "tread", "treads"):
+        if phrase.colors and phrase.where.split(" ")[-1] in RUBBERY:
             return self._of(stuff("rubber", True), phrase)
         if phrase.colors and phrase.where.split(" ")[-1] in SOFT:
             return self._of(stuff("fabric", True), phrase)
@@ -445,6 +445,9 @@ def _greenish(phrase: Phrase) -> bool:
     red, green, blue = _color(phrase)
     return green > 1.15 * red and green > 0.85 * blue
 
+
+RUBBERY = ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires")
+"""Parts that are of rubber where words name their colour alone."""
 
 SOFT = ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
         "sails")
