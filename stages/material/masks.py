@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from stages.material.directions import WHOLE, Pieces, along
-from stages.material.parts import found
+from stages.material.parts import found, is_detail, small_pieces
 from stages.material.patterns import Spectrum, cells, edge, exceeds, fbm, lost, noise, spots, warped
 from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
@@ -30,7 +30,7 @@ FACING = 0.4
 STEEP = 10.0
 """How much farther away what lies behind or faces aside counts."""
 
-LEAST = {"edges": 0.08, "crevices": 0.08, "hidden": 0.06, "up": 0.25, "down": 0.25}
+LEAST = {"edges": 0.08, "details": 0.08, "crevices": 0.08, "hidden": 0.06, "up": 0.25, "down": 0.25}
 """Least of their fields that counts as an edge, a crease, hidden from the sky, facing up or down: a sphere has none of the
 first three, and a box's walls keep no snow."""
 
@@ -95,8 +95,8 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
         return surface.point @ np.array(mask.axis, np.float32)
     if mask.kind == "pieces":
         return np.isin(surface.piece, mask.pieces).astype(np.float32)
-    if mask.kind in ("edges", "crevices"):
-        return surface.convexity if mask.kind == "edges" else np.maximum(-surface.convexity, 0.8 * surface.occlusion - 0.2)
+    if mask.kind in ("edges", "details", "crevices"):
+        return surface.convexity if mask.kind != "crevices" else np.maximum(-surface.convexity, 0.8 * surface.occlusion - 0.2)
     if mask.kind in ("up", "down"):
         return surface.normal[:, 2] if mask.kind == "up" else -surface.normal[:, 2]
     if mask.kind == "hidden":
@@ -218,6 +218,10 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
             return replace(mask, level=0.0)
         if mask.kind == "dots":  # two in each square
             return replace(mask, level=-mask.size * float(np.sqrt(mask.share / (2 * np.pi))))
+        if is_detail(mask):
+            if part := small_pieces(mask, surface):
+                return part
+            mask = replace(mask, kind="edges") if mask.kind == "details" else mask
         if mask.kind in SIDES and mask.said and (part := found(mask, surface)):
             return part
         if mask.draw >= 0:

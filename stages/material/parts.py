@@ -1,4 +1,4 @@
-"""Where a named part lies on a mesh: legs, handle, blade, head and spout, by the shape of what is there.
+"""Where a named part lies on a mesh: legs, handle, blade, head, spout and buckles, by the shape of what is there.
 
 A part is found as a mask of its own: pieces that hang together, what lies beyond a plane, or a height. Where the shape does not
 show it, nothing is found, and the part lies where words alone put it. """
@@ -20,7 +20,11 @@ SPOUTS = ("spout",)
 GUARDS, POMMELS = ("guard", "crossguard", "cross-guard", "tsuba", "quillons", "bolster"), ("pommel",)
 ENDS = ("end",)
 WHEELS = ("wheel", "wheels", "tyre", "tyres", "tire", "tires", "castors", "casters")
-SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS, *WHEELS)
+SMALL = (
+    "buckle", "buckles", "clasp", "clasps", "button", "buttons", "knob", "knobs", "rivet", "rivets", "stud", "studs", "screws",
+    "bolts", "nails", "eyelets", "grommets", "hinges", "fittings", "hardware", "latch", "lock", "padlock",
+)  # fmt: skip
+SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS, *WHEELS, *SMALL)
 """Names of parts that are looked for in the shape of a thing."""
 
 SAMPLED, NEAR = 3000, 160
@@ -97,6 +101,21 @@ def _thin_pieces(mask: Mask, surface: Surface) -> Mask | None:
     legs = [k for k in stands if np.median(thin[some.piece == k]) < THIN]
     share = np.isin(surface.piece, legs).mean()
     return replace(mask, kind="pieces", pieces=tuple(legs), level=0.5) if legs == stands and 0 < share < 0.6 else None
+
+
+MOST_SMALL = 0.2
+"""Share of the surface that small pieces may have between them; where there are more, the whole is made of them."""
+
+
+def is_detail(mask: Mask) -> bool:
+    """Whether a mask is looked for among small pieces: buckles, and parts of which no table knows where they are."""
+    return mask.kind == "details" or mask.said.split(" ")[-1] in SMALL
+
+
+def small_pieces(mask: Mask, surface: Surface) -> Mask | None:
+    """All pieces too small to have directions of their own, beside those that do; None where there are none, or nothing else."""
+    share = float((surface.piece == 0).mean())
+    return replace(mask, kind="pieces", pieces=(0,), level=0.5) if 0 < share < MOST_SMALL else None
 
 
 ALIKE, FLAT = 0.12, 0.75

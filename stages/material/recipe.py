@@ -10,13 +10,13 @@ from typing import Any
 
 KINDS = (
     "all", "below", "above", "middle", "front", "back", "left", "right", "sides", "badge", "fade",
-    "edges", "crevices", "up", "down", "hidden",
+    "edges", "details", "crevices", "up", "down", "hidden",
     "spots", "dots", "flowers", "stripes", "bands", "zigzag", "checks", "gingham", "veins",
     "patches", "streaks", "scratches", "chips", "pieces", "along",
 )  # fmt: skip
 """Ways to say where a layer lies; see `masks.py`."""
 
-SURVEYED = ("edges", "crevices", "hidden", "chips")
+SURVEYED = ("edges", "details", "crevices", "hidden", "chips")
 """Those of them that ask for what a survey knows."""
 
 

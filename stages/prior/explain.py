@@ -9,7 +9,7 @@ PLACES = {
     "all": "everywhere", "below": "lowest {}", "above": "highest {}", "front": "foremost {}", "back": "rearmost {}",
     "middle": "middle {}", "sides": "outermost {} on either side", "badge": "middle of the front, {} wide", "left": "left {}",
     "right": "right {}", "fade": "fading in over the upper {}", "up": "{} facing up", "down": "{} facing down",
-    "edges": "{} on edges",
+    "edges": "{} on edges", "details": "small pieces of their own, or {} on edges",
     "crevices": "{} in crevices", "hidden": "innermost {}", "spots": "spots, {}", "stripes": "stripes, {}",
     "bands": "bands, {}",
     "dots": "dots, {}", "flowers": "flowers, {}", "zigzag": "zigzag, {}", "gingham": "gingham, {}",

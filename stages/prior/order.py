@@ -224,16 +224,19 @@ def _is_detail(phrase: Phrase) -> bool:
     return beside and not (gathering(phrase.substance) or (phrase.substance and family(phrase.substance) == "gem"))
 
 
+ON_EDGES = ("edges", "details")
+
 NARROWER = 0.4
 """Share of the edges of which one says something that the next gets."""
 
 
 def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
-    """Of two that lie on edges the second has the sharpest ones only: "orange corners and worn metal edges"."""
-    at = [k for k, p in enumerate(over) if p.says_what and (p.region.kind == "edges" if p.region else _is_detail(p))]
+    """Of two that lie on edges the second has the sharpest ones only: "orange corners and worn metal edges"; small pieces
+    are the first's."""
+    at = [k for k, p in enumerate(over) if p.says_what and (p.region.kind in ON_EDGES if p.region else _is_detail(p))]
     for number, k in enumerate(at[1:], 1):
         region = over[k].region or DETAILS
-        over[k] = replace(over[k], region=region._replace(share=region.share * NARROWER**number))
+        over[k] = replace(over[k], region=region._replace(kind="edges", share=region.share * NARROWER**number))
     return first, over
 
 

@@ -143,7 +143,7 @@ WET = {"wet": 0.35, "damp": 0.6, "oily": 0.45, "slimy": 0.35}
 SOAKED, POROUS, SOAK = frozenset(["wet", "damp"]), 0.6, 0.72
 """Words of water, the roughness from which on a stuff drinks it, and how much darker it is then."""
 
-DETAILS = Region("edges", 0.1, 0.04, 0.1)
+DETAILS = Region("details", 0.1, 0.04, 0.1)
 """Where a part lies that no table knows."""
 
 SHELLED = frozenset(["ladybird", "ladybug", "tortoiseshell"])

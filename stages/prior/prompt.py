@@ -164,7 +164,7 @@ class Reading:
             mark = _color(phrase) if phrase.colors else _triple(rgb(marks.split()[0]))
             marked = replace(beneath, color=mark, said=_said(phrase))
             return [Layer(marked, (region.mask(phrase.animal),))]
-        mask = self._region(phrase).mask(phrase.where)
+        mask = self._region(phrase).mask(phrase.where or phrase.part)
         if phrase.within and phrase.within.region:
             part = phrase.within.region.mask(phrase.within.where)
             whole = phrase.join.kind == "cover" and not gathering(phrase.substance)

@@ -1,5 +1,7 @@
 """Named parts are found where they are: legs, handles, blades, and nothing where the shape shows none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -143,3 +145,21 @@ def test_wheels_are_the_round_pieces_on_the_floor() -> None:
     car = surface(body, crate, *wheels, apart=True)
     assert ((covered(car, "tyres") > 0.5) == (car.piece > 2)).all()
     assert covered(surface(body, crate, apart=True), "wheels").max() > 0.5  # where words alone put them
+
+
+BELT = [box((-0.5, -0.02, -0.1), (0.5, 0.02, 0.1)), box((-0.06, -0.05, -0.06), (0.06, -0.02, 0.06))]
+
+
+@pytest.mark.parametrize(("word", "region"), [("buckle", "spots"), ("brass buckles", "spots"), ("ferrule", "details")])
+def test_details_are_small_pieces_where_there_are_any(word: str, region: str) -> None:
+    belt = surface(*BELT, apart=True)
+    belt = replace(belt, piece=np.where(belt.piece == 2, 0, belt.piece))  # too small to have directions of its own
+    assert ((covered(belt, word, region=region) > 0.5) == (belt.piece == 0)).all()
+
+
+def test_details_lie_on_edges_where_there_are_no_small_pieces_or_nothing_else() -> None:
+    for piece in (0, 1):
+        belt = surface(*BELT)
+        belt = replace(belt, piece=belt.piece * 0 + piece, convexity=np.where(abs(belt.point[:, 0]) > 0.45, 0.4, 0).astype("f4"))
+        cover = covered(belt, "ferrule", region="details") > 0.5
+        assert 0.05 < cover.mean() < 0.2 and (abs(belt.point[cover, 0]) > 0.44).all()
