@@ -113,7 +113,7 @@ def is_detail(mask: Mask) -> bool:
 
 
 def small_pieces(mask: Mask, surface: Surface) -> Mask | None:
-    """All pieces too small to have directions of their own, beside those that do; None where there are none, or nothing else."""
+    """Pieces too small to have directions of their own, beside those that do; None where there are none or nothing else."""
     share = float((surface.piece == 0).mean())
     return replace(mask, kind="pieces", pieces=(0,), level=0.5) if 0 < share < MOST_SMALL else None
 

@@ -5,12 +5,13 @@ join them ("with", "covered in", "peeling off"); parts ("sole", "rim") and patte
 no table knows, a dictionary may explain by colours; the rest is kept as unknown. """
 
 from collections.abc import Callable, Container, Mapping, Sequence
+from itertools import takewhile
 
 from stages.prior.context import understood
 from stages.prior.motifs import PAINTS
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import DETAILS, PARTS, SHAPES, Region, gathering
+from stages.prior.places import CLOTHES, DETAILS, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import PAINTED, Join, Token, tokens_of
 
@@ -39,6 +40,8 @@ def split(
             much = token.value
             continue
         article = token.article if now.empty else article
+        if token.text == "in" and _dresses(tokens[number + 1 :]):
+            token = token._replace(value=Join("with"))  # "a bear in a blue jacket"
         alone = len(phrases) == 1 and _stands_for_itself(token, now, following, article)
         if alone or (article == "a" and _is_painted(token, phrases)):
             token = Token("thing", token.text)
@@ -53,7 +56,8 @@ def split(
                 now.closed = True
             if token.kind == "join" and token.value.kind == "peel" and "peeling" not in now.weather:
                 now.weather.append("peeling")
-            within = token.text == "in" or (within and token.kind not in ("join", "postfix", "comma", "half"))
+            starts = token.text == "in" and token.value.kind == "in"
+            within = starts or (within and token.kind not in ("join", "postfix", "comma", "half"))
             if token.kind in ("join", "postfix", "comma", "half"):
                 continue
             if _begins(token, now) and not (within and _lacks(token, now)):
@@ -138,11 +142,24 @@ def _begins(token: Token, now: Phrase) -> bool:
     if token.kind == "substance":
         if now.where in SHAPES and not now.substance:
             return False  # "black and white checkerboard tiles", "red gingham cotton"
+        if _is_of(now, text) and not now.placed:
+            return False  # "a knitted bear in grey wool"
         again = bool(now.substance) and text in (*GENERIC, *BOARDS) and family(text) == family(now.substance)
         if again and not now.placed:
             return False  # "a golem of cooled lava rock"
         return now.placed or bool(now.substance and (now.headed or (token.text in PAINTED and not now.coats)))
     return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS and text in PARTS))
+
+
+def _dresses(after: Sequence[Token]) -> bool:
+    """Whether what follows is worn, and has a colour or stuff of its own."""
+    run = list(takewhile(lambda token: token.kind not in ("join", "comma", "half", "postfix"), after))
+    return any(token.kind == "part" and token.text in CLOTHES for token in run) and len(run) > 1
+
+
+def _is_of(now: Phrase, yarn: str) -> bool:
+    """Whether a name says of what yarn a knit is, of which only that was said."""
+    return bool(now.substance) and KNOWN[now.substance][0].look.endswith("knit") and family(yarn) == "fabric"
 
 
 def _lacks(token: Token, now: Phrase) -> bool:
@@ -201,7 +218,7 @@ def _name(phrase: Phrase, text: str) -> None:
     phrase.boards = phrase.boards or text in BOARDS
     if not old:
         phrase.substance = text
-    elif KNOWN[old][0].look == "tartan" and family(old) == family(text):
+    elif (KNOWN[old][0].look == "tartan" and family(old) == family(text)) or _is_of(phrase, text):
         return  # "green tartan wool"
     elif old in ("twill", "herringbone"):
         phrase.substance = text  # "twill carbon fibre"

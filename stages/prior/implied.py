@@ -72,6 +72,8 @@ def _stuffs(phrases: list[Phrase]) -> None:
 USUAL = {
     **dict.fromkeys(("tyres", "tires", "tyre", "tire"), ("rubber", ["black"])),
     **dict.fromkeys(("stand", "tripod"), ("black iron", [])),
+    **dict.fromkeys(("windows", "windshield", "windscreen", "lens", "lenses"), ("glass", [])),
+    "jeans": ("denim", []),
 }  # fmt: skip
 """Parts that are of the same stuff on all things, where none is said: its name and colours."""
 

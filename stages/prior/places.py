@@ -35,9 +35,15 @@ def _places(wanted: str) -> dict[str, Region]:
 PARTS = _places("part")
 """Parts of things that name a region."""
 
-WORN = frozenset([
-    "chest", "armour", "armor", "shirt", "tunic", "vest", "jacket", "sweater", "robe", "breastplate", "trousers", "pants",
-    "jeans", "shorts", "skirt", "boots", "shoes", "sneakers", "sandals", "panel", "panels",
+CLOTHES = frozenset([
+    "shirt", "tunic", "vest", "jacket", "sweater", "robe", "trousers", "pants", "jeans", "shorts", "skirt", "coat", "waistcoat",
+    "hoodie", "jumper", "cardigan", "blouse", "dress", "gown", "kimono", "apron", "overalls", "dungarees", "uniform", "cloak",
+    "cape",
+])  # fmt: skip
+"""Parts of who wears them; of cloth, but on what is cast, carved or painted."""
+
+WORN = CLOTHES | frozenset([
+    "chest", "armour", "armor", "breastplate", "boots", "shoes", "sneakers", "sandals", "panel", "panels",
 ])  # fmt: skip
 """Parts that are things of their own unless another thing has them: "an orc with brown boots"."""
 

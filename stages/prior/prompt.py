@@ -25,6 +25,7 @@ from stages.prior.order import ROOFING, in_its_places, ordered
 from stages.prior.phrases import Phrase, is_hue
 from stages.prior.places import (
     ANIMALS,
+    CLOTHES,
     CORRODES,
     DETAILS,
     FADE,
@@ -65,6 +66,9 @@ SIMILAR = 0.2
 
 BESIDE = ("with", "over", "and", "comma", "on")
 """Joins that leave open where a phrase lies."""
+
+STRIPS = ("below", "above", "front", "back", "left", "right", "middle")
+"""Places that are as high or wide as their word says, however much lies there: "lots of rust near the bottom"."""
 
 UNSAID = "plaster"
 """What a thing is taken to be made of where neither words nor tables say."""
@@ -191,7 +195,8 @@ class Reading:
 
     def _region(self, phrase: Phrase) -> Region:
         """Where a phrase lies."""
-        return _scaled(self._whole_region(phrase), phrase.much)
+        region = self._whole_region(phrase)
+        return region if phrase.region and region.kind in STRIPS else _scaled(region, phrase.much)
 
     def _whole_region(self, phrase: Phrase) -> Region:
         gathers = GATHERS.get(gathering(phrase.substance))
@@ -245,10 +250,11 @@ class Reading:
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
         if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
-        if phrase.colors and phrase.where.split(" ")[-1] in RUBBERY:
-            return self._of(stuff("rubber", True), phrase)
-        if phrase.colors and phrase.where.split(" ")[-1] in SOFT:
-            return self._of(stuff("fabric", True), phrase)
+        part = phrase.where.split(" ")[-1]
+        clothed = beneath is not None and part in CLOTHES and _family_of(beneath.look) in ("organic", "fabric")
+        of_part = "fabric" if clothed else next((name for name, parts in OF_STUFF.items() if part in parts), "")
+        if phrase.colors and of_part:
+            return self._of(stuff(of_part, True), phrase)
         if beneath is not None and phrase.colors:  # of the same stuff
             kind = phrase.region.kind if phrase.region else JOINED.get(phrase.join.kind, JOINED["with"]).kind
             raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone")
@@ -446,12 +452,13 @@ def _greenish(phrase: Phrase) -> bool:
     return green > 1.15 * red and green > 0.85 * blue
 
 
-RUBBERY = ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires")
-"""Parts that are of rubber where words name their colour alone."""
-
-SOFT = ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
-        "sails")
-"""Parts that are of cloth where words name their colour alone."""
+OF_STUFF = {
+    "rubber": ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires"),
+    "fabric": ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
+               "sails"),
+    "glass": ("lens", "lenses", "window", "windows", "windshield", "windscreen"),
+}  # fmt: skip
+"""What parts are of where words name their colour alone."""
 
 DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "silver", "brass", "bronze", "copper", "chrome"])
 """Metals that take colour as metals, or have their own."""

@@ -160,6 +160,7 @@ def test_details_are_small_pieces_where_there_are_any(word: str, region: str) ->
 def test_details_lie_on_edges_where_there_are_no_small_pieces_or_nothing_else() -> None:
     for piece in (0, 1):
         belt = surface(*BELT)
-        belt = replace(belt, piece=belt.piece * 0 + piece, convexity=np.where(abs(belt.point[:, 0]) > 0.45, 0.4, 0).astype("f4"))
+        sharp = np.where(abs(belt.point[:, 0]) > 0.45, 0.4, 0).astype("f4")
+        belt = replace(belt, piece=belt.piece * 0 + piece, convexity=sharp)
         cover = covered(belt, "ferrule", region="details") > 0.5
         assert 0.05 < cover.mean() < 0.2 and (abs(belt.point[cover, 0]) > 0.44).all()
