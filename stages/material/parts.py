@@ -22,7 +22,7 @@ ENDS = ("end",)
 WHEELS = ("wheel", "wheels", "tyre", "tyres", "tire", "tires", "castors", "casters")
 SMALL = (
     "buckle", "buckles", "clasp", "clasps", "button", "buttons", "knob", "knobs", "rivet", "rivets", "stud", "studs", "screws",
-    "bolts", "nails", "eyelets", "grommets", "hinges", "fittings", "hardware", "latch", "lock", "padlock",
+    "bolts", "nails", "eyelets", "grommets", "eye", "eyes", "hinges", "fittings", "hardware", "latch", "lock", "padlock",
 )  # fmt: skip
 SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS, *WHEELS, *SMALL)
 """Names of parts that are looked for in the shape of a thing."""

@@ -42,6 +42,7 @@ RARE = {
     "blue grey": "#607c8e", "bottle green": "#044a05", "bubblegum pink": "#fe83cc", "burnt orange": "#c04e01",
     "burnt sienna": "#b04e0f", "burnt umber": "#a0450e", "butter yellow": "#fffd74", "canary yellow": "#fffe40",
     "candy pink": "#ff63e9", "carnation pink": "#ff7fa7", "cool grey": "#95a3a6", "coral pink": "#ff6163",
+    "light blue": "#8fc4ea", "pale blue": "#c4dff0",
     "cornflower blue": "#5170d7", "cranberry": "#9e003a", "denim blue": "#3b5b92", "dusty rose": "#c0737a",
     "dusky pink": "#cc7a8b", "duck egg blue": "#c3fbf4", "egg shell": "#fffcc4", "electric blue": "#0652ff",
     "electric green": "#21fc0d", "electric purple": "#aa23ff", "fire engine red": "#fe0002",

@@ -60,12 +60,17 @@ FRAMES, SEATS = ("frame", "framework"), ("seat", "cushion", "cushions", "upholst
 
 
 def _framed(first: Phrase, over: list[Phrase]) -> Order:
-    """A frame is the base of what sits in it: "a chair: oak frame, velvet seat"."""
-    if first.thing and not (first.substance or first.region) and all(p.where in PARTS and p.substance for p in over):
+    """A frame is the base of what sits in it: "a chair: oak frame, velvet seat"; a seat is that of what is all upholstered:
+    "a bar stool with chrome legs and a red vinyl seat"."""
+    if first.thing and not (first.substance or first.region) and all(p.where in PARTS and p.says_what for p in over):
         frame = next((p for p in over if p.where in FRAMES), None)
         if frame and any(p.where in SEATS for p in over):
             whole = replace(frame, thing=first.thing, region=None, where="", join=first.join)
             return whole, [p for p in over if p is not frame]
+        seat = next((p for p in over if p.where == "seat"), None)
+        if seat and not first.colors and _upholstered(first):
+            whole = replace(seat, thing=first.thing, region=None, where="", join=first.join)
+            return whole, [p for p in over if p is not seat]
     return first, over
 
 
@@ -151,8 +156,13 @@ def _sawn(phrase: Phrase, thing: Phrase) -> bool:
 
 def _upholsters(phrase: Phrase, thing: Phrase) -> bool:
     """Whether what a thing is upholstered in is all that one sees of it: of an armchair, not of a chair."""
+    return phrase.join.kind == "seat" and _upholstered(thing)
+
+
+def _upholstered(thing: Phrase) -> bool:
+    """Whether cloth or leather is all that one sees of a thing."""
     usual = split(OBJECTS[thing.thing].made)[0]
-    return phrase.join.kind == "seat" and bool(usual.substance) and family(usual.substance) in ("fabric", "leather")
+    return bool(usual.substance) and family(usual.substance) in ("fabric", "leather")
 
 
 def _either_side(first: Phrase, over: list[Phrase]) -> Order:
@@ -189,8 +199,8 @@ def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     places = PARTS_OF.get(thing or first.thing, {})
     for phrase in over:
         for part in (phrase, phrase.within):
-            if part and part.where:
-                part.region = places.get(part.where.split(" ")[-1], part.region)
+            if part and (part.where or part.part):
+                part.region = places.get((part.where or part.part).split(" ")[-1], part.region)
     return first, over
 
 

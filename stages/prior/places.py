@@ -76,6 +76,7 @@ PARTS_OF = _of_things(
     ("staff, wizard staff, wand, sceptre, scepter, lighthouse, obelisk", {"top": Region("above", 0.14)}),
     ("handbag, purse, shoulder bag, clutch",
      dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
+    ("cannon, howitzer, carronade, mortar", dict.fromkeys(("carriage", "wheels"), Region("below", 0.45))),
     ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
     ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
      {"roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3),

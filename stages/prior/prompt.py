@@ -455,7 +455,7 @@ def _greenish(phrase: Phrase) -> bool:
 OF_STUFF = {
     "rubber": ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires"),
     "fabric": ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
-               "sails"),
+               "sails", "tie", "bowtie", "necktie"),
     "glass": ("lens", "lenses", "window", "windows", "windshield", "windscreen"),
 }  # fmt: skip
 """What parts are of where words name their colour alone."""
