@@ -1,6 +1,7 @@
 """Batches for training: stored transport, mixed and tinted, shaded with fresh materials.
 
-A batch is a function of tiles, seed and step alone, so a resumed run sees what an uninterrupted one would have seen.
+A material costs more than to light it, so that each is seen in a few pictures of its shape, under lights of their own. A
+batch is a function of tiles, seed and step alone, so a resumed run sees what an uninterrupted one would have seen.
 """
 
 from dataclasses import dataclass
@@ -39,14 +40,16 @@ class Batch:
 
 
 @dataclass(frozen=True)
-class Tile:
-    """One stored picture: where the object is, its surface and its transport under each light (P, L, 19, 3) float16.
+class TiledShape:
+    """A shape and its T stored pictures, whose P object points lie in the order of tiles and of their masks' pixels.
 
-    even: points spread evenly over the whole shape. pieces: of it.
+    mask, depth: (T, S, S). start: (T + 1,) where each tile's points begin. normal: (P, 3) view space. transport: (P, L, 19, 3)
+    float16 under each light. cosine: (P,). even: points spread evenly over the whole shape. pieces: of it.
     """
 
     mask: NDArray[np.bool_]
     depth: NDArray[np.float32]
+    start: NDArray[np.int64]
     normal: NDArray[np.float32]
     surface: Surface
     transport: NDArray[np.float16]
@@ -56,26 +59,30 @@ class Tile:
 
 
 class Tiles:
-    """All tiles of some shards, in memory."""
+    """The tiles of some shards, in memory, by shape."""
 
     def __init__(self, paths: list[Path]) -> None:
         self.shards = [load_npz(path, SHARD).arrays for path in paths]
-        self.where = [(s, t) for s, shard in enumerate(self.shards) for t in range(len(shard["mask"]))]
+        self.where = [(s, int(k)) for s, shard in enumerate(self.shards) for k in np.unique(shard["shape"])]
 
     def __len__(self) -> int:
         return len(self.where)
 
-    def __getitem__(self, index: int) -> Tile:
-        shard, tile = self.shards[self.where[index][0]], self.where[index][1]
-        part, shape = slice(shard["start"][tile], shard["start"][tile + 1]), shard["shape"][tile]
+    def __getitem__(self, index: int) -> TiledShape:
+        number, shape = self.where[index]
+        shard = self.shards[number]
+        first, last = np.searchsorted(shard["shape"], [shape, shape + 1])  # a shape's tiles follow one another
+        tiles, start = slice(first, last), shard["start"][first : last + 1]
+        part = slice(start[0], start[-1])
         surface, even = _surface(shard, "", part), _surface(shard, "even_", shape)
         pieces = Pieces(*(shard[f"pieces_{name}"][shard["pieces_shape"] == shape] for name in Pieces._fields))
-        normal = surface.normal @ shard["to_view"][tile].T
+        to_view = np.repeat(shard["to_view"][tiles], np.diff(start), 0)
+        normal = np.einsum("pij,pj->pi", to_view, surface.normal)
         light = shard["transport"][part], shard["cosine"][part]
-        return Tile(shard["mask"][tile], shard["depth"][tile], normal, surface, *light, even, pieces)
+        return TiledShape(shard["mask"][tiles], shard["depth"][tiles], start - start[0], normal, surface, *light, even, pieces)
 
 
-def _surface(shard: dict[str, NDArray], prefix: str, rows: slice | NDArray) -> Surface:
+def _surface(shard: dict[str, NDArray], prefix: str, rows: slice | int) -> Surface:
     """Stored points of a shape, which has no parts."""
     stored = {name: shard[prefix + name][rows] for name in SURFACE}
     return Surface(**stored, label=np.zeros(len(stored["point"]), np.int32))
@@ -89,9 +96,13 @@ class PictureBatches(torch.utils.data.Dataset):
 
     def __getitem__(self, step: int) -> Batch:
         rng = default_rng([self.seed, 1, step])
-        pictures = [picture(self.tiles[int(rng.integers(len(self.tiles)))], rng) for _ in range(self.size)]
-        captions, images = zip(*pictures, strict=True)
-        return assemble(list(captions), torch.from_numpy(np.stack(images)), rng)
+        captions, images = list[str](), list[NDArray[np.float32]]()
+        while len(captions) < self.size:
+            caption, some = pictures(self.tiles[int(rng.integers(len(self.tiles)))], rng)
+            captions += [caption] * len(some)
+            images += some
+        captions, images = captions[: self.size], images[: self.size]
+        return assemble(captions, torch.from_numpy(np.stack(images)), rng)
 
 
 @dataclass(frozen=True)
@@ -119,28 +130,40 @@ CHANNELS = {"mask": 1, "depth": 1, "normal": 3, "height": 1, "lights": 18, "radi
 """Channels of a picture as `picture` lays them out."""
 
 
-def picture(tile: Tile, rng: Generator) -> tuple[str, NDArray[np.float32]]:
-    """One tile under a random light with a random material.
+TILES, LIGHTINGS = 2, 2
+"""In how many tiles of its shape a material is seen, and under how many lights in each."""
+
+
+def pictures(shape: TiledShape, rng: Generator) -> tuple[str, list[NDArray[np.float32]]]:
+    """A random material on a shape, in some of its tiles under random lights.
 
     Returns:
-        caption, channels (32, S, S) as `CHANNELS`, zero off the object.
+        caption, pictures of channels (32, S, S) as `CHANNELS`, zero off the object.
     """
-    transport = random_transport(tile.transport, tile.cosine, rng)
     material = random_material(rng)
-    recipe = settled(material.recipe, tile.even, tile.pieces)
-    values = np.ascontiguousarray(evaluate(recipe, tile.surface, tile.pieces)[:, :5])  # (P, 5)
-    parameters = torch.from_numpy(values)
-    radiance = shade(transport, Material.of(parameters))
+    recipe = settled(material.recipe, shape.even, shape.pieces)
+    found = list[NDArray[np.float32]]()
+    for tile in rng.permutation(len(shape.mask))[:TILES]:
+        rows = slice(shape.start[tile], shape.start[tile + 1])
+        values = np.ascontiguousarray(evaluate(recipe, shape.surface[rows], shape.pieces)[:, :5])  # (P, 5)
+        found += [picture(shape, int(tile), values, rng) for _ in range(LIGHTINGS)]
+    return material.caption, found
+
+
+def picture(shape: TiledShape, tile: int, values: NDArray[np.float32], rng: Generator) -> NDArray[np.float32]:
+    """One tile of a shape under a random light: channels (32, S, S). Args: values: (P, 5) material of the tile's points."""
+    rows, mask = slice(shape.start[tile], shape.start[tile + 1]), shape.mask[tile]
+    transport = random_transport(shape.transport[rows], shape.cosine[rows], rng)
+    radiance = shade(transport, Material.of(torch.from_numpy(values)))
     lights = light_maps(transport).reshape(len(values), 18).numpy()
-    depth, height = tile.depth[tile.mask][:, None], tile.surface.point[:, 2:]
-    parts = (np.ones_like(height), depth, tile.normal, height, lights, radiance.numpy(), encoded(values))
-    flat = np.concatenate(parts, 1).astype(np.float32)
-    dense = np.zeros((flat.shape[1], SIZE, SIZE), np.float32)
-    dense[:, tile.mask] = flat.T
+    depth, height = shape.depth[tile][mask][:, None], shape.surface.point[rows, 2:]
+    parts = (np.ones_like(height), depth, shape.normal[rows], height, lights, radiance.numpy(), encoded(values))
+    dense = np.zeros((sum(CHANNELS.values()), SIZE, SIZE), np.float32)
+    dense[:, mask] = np.concatenate(parts, 1).T
     if rng.random() < 0.5:  # a mirrored world is as good
         dense = dense[..., ::-1].copy()
         dense[2] *= -1
-    return material.caption, dense
+    return dense
 
 
 def random_transport(stored: NDArray[np.float16], cosine: NDArray[np.float32], rng: Generator) -> Transport:

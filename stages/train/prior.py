@@ -64,13 +64,13 @@ NULL_TEXT, NO_GEOMETRY, NO_LIGHT = 0.12, 0.15, 0.15
 WORD_NOISE = 0.06
 """Deviation of the noise on each component of a (unit) word vector, so that neighbours of a word are learnt with it."""
 
-FREE = ("device", "workers", "checkpoint_every", "sample_every", "shards")
-"""Options that a run may be continued with others of; more shards are more to learn from, from then on."""
+FREE = ("device", "workers", "checkpoint_every", "sample_every", "shards", "steps")
+"""Options that a run may be continued with others of; more shards are more to learn from, from then on, and more steps go on
+from where it stands, at the rate that a run of so many has there."""
 
 CAPTIONS = 256
 WARM_UP = 150
 BETAS = (0.9, 0.99)
-HELD_OUT_TILES = 16
 
 
 @dataclass(frozen=True)
@@ -130,8 +130,8 @@ def train_prior(
         inputs["start"] = sha256_file(options.start)
     request = Provenance(learnt_from(options), options.seed, inputs)
     done = None if force else peek(weights, WEIGHTS)
-    if done is not None and done.same_request(request) and done.extra["training"]["step"] == options.steps:
-        return TrainPriorResult(weights, options.steps, up_to_date=True)
+    if done is not None and done.same_request(request) and done.extra["training"]["step"] >= options.steps:
+        return TrainPriorResult(weights, done.extra["training"]["step"], up_to_date=True)
     tiles = Tiles(render_shards(out / "shards", options.shards, options.tiles, options.seed, progress))
     vocabulary = Vocabulary.load(VOCABULARY_FILE)
     with torch.random.fork_rng():  # nn.Module initialisation knows only the global generator, which is put back

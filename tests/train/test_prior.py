@@ -1,5 +1,7 @@
 """A miniature training run: tiny, but every part of the real one."""
 
+import dataclasses
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +14,7 @@ from stages.core.images import read_image
 from stages.core.progress import silent
 from stages.prior.model import VOCABULARY_FILE, PriorNetwork, load_prior, save_weights
 from stages.prior.vocabulary import Vocabulary
-from stages.train import prior, render, samples
+from stages.train import batches, prior, render, samples
 from stages.train.batches import CaptionBatches, PictureBatches, Tiles
 from stages.train.options import TrainPriorOptions
 
@@ -46,6 +48,20 @@ def test_batches_depend_on_seed_and_step_alone(shards: list[Path]) -> None:
     assert one.material.min() >= 0 and one.material.max() <= 1
 
 
+def test_a_material_is_seen_in_tiles_of_its_shape_under_lights_of_their_own(shards: list[Path]) -> None:
+    tiles = Tiles(shards)
+    assert sum(len(tiles[k].mask) for k in range(len(tiles))) == 3, "each tile belongs to one shape"
+    shape = max((tiles[k] for k in range(len(tiles))), key=lambda shape: len(shape.mask))
+    caption, some = batches.pictures(shape, np.random.default_rng(4))
+    assert caption and len(some) == batches.TILES * batches.LIGHTINGS and len(shape.mask) >= batches.TILES
+    assert all(not np.allclose(a, b) for a, b in itertools.combinations(some, 2))
+    for first in range(0, len(some), batches.LIGHTINGS):
+        one, other = (np.sort(dense[-5:].reshape(5, -1), 1) for dense in some[first : first + 2])
+        assert np.array_equal(one, other), "a tile's material does not know its light, mirrored or not"
+        assert any((some[first][0].sum(0) == mask.sum(0)).all() or (some[first][0].sum(0) == mask.sum(0)[::-1]).all()
+                   for mask in shape.mask)  # fmt: skip
+
+
 def test_phrases_and_their_materials_agree_in_number() -> None:
     batch = CaptionBatches(40, 0)[0]
     assert len(batch.captions) == 40 and batch.coats.shape == (40, 5)
@@ -68,6 +84,15 @@ def test_training_resumes_to_the_same_bytes(tmp_path: Path, quick: None) -> None
     for name in ("parameters", "average", "moment_1", "moment_2"):
         assert np.array_equal(first[name], second[name]), name
     assert np.array_equal(first["curve"][:, :4], second["curve"][:, :4])
+
+
+def test_more_steps_go_on_from_where_a_run_ended(tmp_path: Path, quick: None) -> None:
+    prior.train_prior(tmp_path, OPTIONS)
+    first = load_npz(tmp_path / "checkpoint.npz", prior.CHECKPOINT)
+    longer = prior.train_prior(tmp_path, dataclasses.replace(OPTIONS, steps=8))
+    second = load_npz(tmp_path / "checkpoint.npz", prior.CHECKPOINT)
+    assert longer.step == 8 and np.array_equal(second["curve"][:6], first["curve"])
+    assert prior.train_prior(tmp_path, OPTIONS).up_to_date, "fewer were done long ago"
 
 
 def test_training_begins_with_what_fits_of_earlier_weights(tmp_path: Path) -> None:
