@@ -19,7 +19,7 @@ HEADS = ("blade", "blades", "head")
 SPOUTS = ("spout",)
 GUARDS, POMMELS = ("guard", "crossguard", "cross-guard", "tsuba", "quillons", "bolster"), ("pommel",)
 ENDS = ("end",)
-WHEELS = ("wheel", "wheels", "tyre", "tyres", "tire", "tires", "castors", "casters")
+WHEELS = ("wheel", "wheels", "rims", "hubcaps", "alloys", "tyre", "tyres", "tire", "tires", "castors", "casters")
 SMALL = (
     "buckle", "buckles", "clasp", "clasps", "button", "buttons", "knob", "knobs", "rivet", "rivets", "stud", "studs", "screws",
     "bolts", "nails", "eyelets", "grommets", "eye", "eyes", "hinges", "fittings", "hardware", "latch", "lock", "padlock",

@@ -60,7 +60,8 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             before.colors += phrase.colors
             _add(before.weather, phrase.weather)
         elif before and not phrase.says_what and not phrase.region:  # "bronze, polished"
-            whole = result[0] if before.region and phrase.join.kind == "comma" else before  # "a boot with a red sole, worn"
+            laid = bool(before.region) and (phrase.join.kind == "comma" or bool(gathering(before.substance)))
+            whole = result[0] if laid else before  # "a boot with a red sole, worn"
             if any(word in SHOWS for word in phrase.weather):
                 whole = next((p for p in result if p.coats), whole)  # "green paint over wood, peeling"
             whole.finish += phrase.finish

@@ -250,7 +250,7 @@ COATS = frozenset(["skin", "hide", "scales", "feathers", "fur", "hair", "pelt", 
 
 FIGURES = COATS | frozenset([
     "horn", "antler", "seashell", "shells", "conch", "bone", "skull", "skulls", "plumes",
-    "leaf", "leaves", "ivy", "vine", "vines", "comb", "log", "roots", "twigs", "crust", "ribbon", "ribbons", "rope", "cord",
+    "leaf", "leaves", "ivy", "vine", "vines", "comb", "roots", "twigs", "crust", "ribbon", "ribbons", "rope", "cord",
     "string", "netting", "card", "tusk", "tusks", "tooth", "teeth", "fangs", "claw", "claws", "hoof", "foliage",
     "mane", "grass",
 ])  # fmt: skip

@@ -6,14 +6,14 @@ from itertools import pairwise
 from stages.prior.colors import CHANGES
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, is_hue
-from stages.prior.places import GATHERS, PARTS, SHAPES, Region, gathering
+from stages.prior.places import GATHERS, HEADED, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import ROOFS
 from stages.prior.tokens import singulars
 
 
 def implied(phrases: list[Phrase]) -> None:
     """Say it, in place. Args: phrases: one or more."""
-    for step in (_alone, _listed, _bodies, _fronts, _sprinkles, _shade, _scorch, _stuffs):
+    for step in (_alone, _listed, _bodies, _fronts, _heads, _sprinkles, _shade, _scorch, _stuffs):
         step(phrases)
 
 
@@ -51,6 +51,25 @@ def _fronts(phrases: list[Phrase]) -> None:
             phrase.within = Phrase(region=Region("badge", 1.4), where="front")
 
 
+def _heads(phrases: list[Phrase]) -> None:
+    """A beard, a visor or eyes are in front of the head, and shoulder pads beside it, of who has one."""
+    if phrases[0].thing not in HEADED:
+        return
+    for phrase in phrases[1:]:
+        part = phrase.where.split(" ")[-1]
+        if part in FACIAL and not phrase.within:
+            phrase.region = Region("front", FACIAL[part])
+            phrase.within = Phrase(region=Region("above", 0.28), where="head")
+        elif part in SHOULDERED and not phrase.within:
+            phrase.within = Phrase(region=Region("above", 0.4), where="shoulders")
+
+
+FACIAL = {"beard": 0.45, "moustache": 0.3, "visor": 0.45, "mask": 0.45, "eyes": 0.25, "goggles": 0.35, "faceplate": 0.45}
+"""Parts in front of a head, and how far back they reach."""
+
+SHOULDERED = ("pads", "pad", "pauldrons", "pauldron", "guards", "plates", "epaulettes")
+
+
 def _sprinkles(phrases: list[Phrase]) -> None:
     """Sprinkles lie on the icing."""
     for before, phrase in pairwise(phrases):
@@ -73,7 +92,7 @@ USUAL = {
     **dict.fromkeys(("tyres", "tires", "tyre", "tire"), ("rubber", ["black"])),
     **dict.fromkeys(("stand", "tripod"), ("black iron", [])),
     **dict.fromkeys(("windows", "windshield", "windscreen", "lens", "lenses"), ("glass", [])),
-    "jeans": ("denim", []),
+    "jeans": ("denim", []), **dict.fromkeys(("pages", "page edges"), ("paper", ["cream"])),
 }  # fmt: skip
 """Parts that are of the same stuff on all things, where none is said: its name and colours."""
 

@@ -7,7 +7,7 @@ from stages.prior.colors import COLORS
 from stages.prior.grammar import split
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
-from stages.prior.places import DETAILS, PARTS, PARTS_OF, PEELS, SHAPES, Region, gathering
+from stages.prior.places import CLOTHES, DETAILS, PARTS, PARTS_OF, PEELS, PERSONS, SHAPES, Region, gathering
 from stages.prior.stuffs import KNOWN
 from stages.prior.tokens import Join
 
@@ -60,18 +60,38 @@ FRAMES, SEATS = ("frame", "framework"), ("seat", "cushion", "cushions", "upholst
 
 
 def _framed(first: Phrase, over: list[Phrase]) -> Order:
-    """A frame is the base of what sits in it: "a chair: oak frame, velvet seat"; a seat is that of what is all upholstered:
-    "a bar stool with chrome legs and a red vinyl seat"."""
+    """A frame is the base of what sits in it: "a chair: oak frame, velvet seat". Where there is none, a seat or table top is
+    that of its legs, and of what is all upholstered; legs are that of a chair."""
     if first.thing and not (first.substance or first.region) and all(p.where in PARTS and p.says_what for p in over):
         frame = next((p for p in over if p.where in FRAMES), None)
         if frame and any(p.where in SEATS for p in over):
             whole = replace(frame, thing=first.thing, region=None, where="", join=first.join)
             return whole, [p for p in over if p is not frame]
-        seat = next((p for p in over if p.where == "seat"), None)
-        if seat and not first.colors and _upholstered(first):
-            whole = replace(seat, thing=first.thing, region=None, where="", join=first.join)
-            return whole, [p for p in over if p is not seat]
+        seat, legs = (next((p for p in over if p.where in places), None) for places in (("seat", "top"), ("legs",)))
+        upper = _upholstered(first) or not first.thing.endswith("chair")
+        if seat and not first.colors and (_upholstered(first) or legs):
+            main = seat if upper or not legs else legs  # the seat is all of a stool that its legs are not
+            whole = replace(main, thing=first.thing, region=None, where="", join=first.join)
+            return whole, [p for p in over if p is not main]
     return first, over
+
+
+def _clothed(first: Phrase, over: list[Phrase]) -> Order:
+    """Skin shows of a person beside clothes: "a pirate with a red coat"."""
+    if first.thing in PERSONS and not first.says_stuff and any(p.where in CLOTHES for p in over):
+        return replace(first, substance="skin"), over
+    return first, over
+
+
+def _panelled(first: Phrase, over: list[Phrase]) -> Order:
+    """Panels are all of a thing of which nothing else is said: "a crate with white painted panels"."""
+    bare = bool(first.thing) and not (first.substance or first.colors or first.unknown or first.animal)
+    panels = next((p for p in over if p.where in ("panel", "panels", "plates", "plating") and p.says_what), None)
+    if not (bare and panels):
+        return first, over
+    weather = [*first.weather, *panels.weather]
+    whole = replace(panels, thing=first.thing, region=None, where="", join=first.join, weather=weather)
+    return whole, [p for p in over if p is not panels]
 
 
 ROOFING = frozenset(["thatch", "thatched", "roof tiles", "shingles", "slate tiles", "roof slates"])
@@ -196,7 +216,8 @@ def _bared(first: Phrase, over: list[Phrase]) -> Order:
 
 def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     """Parts of a thing that has them elsewhere than others. Args: thing: where the first does not name it."""
-    places = PARTS_OF.get(thing or first.thing, {})
+    name = thing or first.thing
+    places = PARTS_OF.get(name) or PARTS_OF.get(name.split(" ")[-1], {})
     for phrase in over:
         for part in (phrase, phrase.within):
             if part and (part.where or part.part):
@@ -251,6 +272,7 @@ def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
 
 
 STEPS = (
-    in_its_places, _largest, _framed, _of_body, _told_after, _either_side, _bared, _smaller_last, _dirt_last, _edges_apart,
+    in_its_places, _largest, _framed, _panelled, _clothed, _of_body, _told_after, _either_side, _bared, _smaller_last,
+    _dirt_last, _edges_apart,
 )  # fmt: skip
 """What orders phrases, one after the other."""

@@ -38,9 +38,22 @@ PARTS = _places("part")
 CLOTHES = frozenset([
     "shirt", "tunic", "vest", "jacket", "sweater", "robe", "trousers", "pants", "jeans", "shorts", "skirt", "coat", "waistcoat",
     "hoodie", "jumper", "cardigan", "blouse", "dress", "gown", "kimono", "apron", "overalls", "dungarees", "uniform", "cloak",
-    "cape",
+    "cape", "robes", "jumpsuit",
 ])  # fmt: skip
 """Parts of who wears them; of cloth, but on what is cast, carved or painted."""
+
+PERSONS = frozenset(words(
+    "wizard, pirate, warrior, soldier, ranger, rogue, peasant, villager, farmer, hunter, archer, cowboy, sheriff, monk, "
+    "blacksmith, merchant, witch, ninja, vampire, priest, nun, mage, sorcerer, sorceress, warlock, necromancer, assassin, "
+    "businessman, butler, king, queen, prince, princess, clown, jester, jedi, elf, fairy, santa claus, sailor, postman"
+))  # fmt: skip
+"""Those of whom skin shows beside the clothes that words give them."""
+
+HEADED = PERSONS | frozenset(words(
+    "knight, astronaut, cosmonaut, spacesuit, space suit, robot, android, cyborg, gnome, garden gnome, snowman, skeleton, "
+    "zombie, alien, orc, goblin, troll, dwarf, doll, action figure, man, woman, boy, girl, barbarian, paladin, crusader, mech"
+))  # fmt: skip
+"""Those that have a head on top, on which a beard or a visor is."""
 
 WORN = CLOTHES | frozenset([
     "chest", "armour", "armor", "breastplate", "boots", "shoes", "sneakers", "sandals", "panel", "panels",
@@ -72,14 +85,16 @@ PARTS_OF = _of_things(
     ("armchair, sofa, couch, settee, ottoman, lounge chair", {"upholstery": PARTS["body"], "cushions": Region("up", 0.45)}),
     ("house, cottage, stone cottage, building, villa, church, chapel, shop, cabin, hut, barn, townhouse",
      {"door": Region("badge", 0.25), "doors": Region("badge", 0.25)}),
-    ("mushroom, toadstool, fly agaric, fly agaric mushroom", {"cap": Region("above", 0.45), "stem": Region("below", 0.55)}),
+    ("mushroom, toadstool, fly agaric, fly agaric mushroom, mushroom house, toadstool house",
+     {"cap": Region("above", 0.5), "stem": Region("below", 0.55)}),
     ("staff, wizard staff, wand, sceptre, scepter, lighthouse, obelisk", {"top": Region("above", 0.14)}),
     ("handbag, purse, shoulder bag, clutch",
      dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
     ("cannon, howitzer, carronade, mortar", dict.fromkeys(("carriage", "wheels"), Region("below", 0.45))),
     ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
     ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
-     {"roof": Region("above", 0.2), "wheels": Region("below", 0.25), "bonnet": Region("front", 0.3),
+     {"roof": Region("above", 0.2), **dict.fromkeys(("wheels", "rims", "hubcaps", "alloys"), Region("below", 0.25)),
+      "bonnet": Region("front", 0.3),
       "hood": Region("front", 0.3)}),
 )  # fmt: skip
 """Things whose parts lie elsewhere than those of others."""
@@ -96,7 +111,8 @@ ANIMALS = {
 GATHERS = _places("gathers")
 """What gathers of itself, and where it does when nobody says."""
 
-ONCE = {"lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt",
+ONCE = {**dict.fromkeys(("ice cream", "strawberry ice cream", "chocolate ice cream", "mint ice cream"), "icing"),
+        "lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt",
         "earth": "dirt", "dried mud": "mud", "cracked mud": "mud", "dried blood": "blood", "powdered sugar": "icing sugar",
         "hard water stains": "limescale", "calcium deposits": "limescale", "droppings": "bird droppings",
         "guano": "bird droppings",

@@ -239,7 +239,7 @@ class Reading:
             named = gaudy.get(phrase.substance, phrase.substance) if _gaudy(phrase) else phrase.substance
             if CORRODES.get(KNOWN[named][0].look) == "verdigris" and _greenish(phrase):
                 named, phrase = "verdigris", replace(phrase, colors=[])  # "copper gone green"
-            return self._of(stuff(named, bool(phrase.colors)), phrase)
+            return self._of(stuff(named, any(map(is_hue, phrase.colors))), phrase)
         if made:
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
@@ -251,8 +251,8 @@ class Reading:
         if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
         part = phrase.where.split(" ")[-1]
-        clothed = beneath is not None and part in CLOTHES and _family_of(beneath.look) in ("organic", "fabric")
-        of_part = "fabric" if clothed else next((name for name, parts in OF_STUFF.items() if part in parts), "")
+        worn = beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal")
+        of_part = next((name for name, parts in (OF_STUFF | (WORN_OF if worn else {})).items() if part in parts), "")
         if phrase.colors and of_part:
             return self._of(stuff(of_part, True), phrase)
         if beneath is not None and phrase.colors:  # of the same stuff
@@ -423,7 +423,7 @@ def _painted(made: Phrase) -> str:
     if not hues or made.substance in DYED_METALS:
         return made.substance
     named, usual = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (_color(made), own.color))
-    grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH)
+    grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH) and named[0] < WHITE
     same = own.family == "wood" and float(np.linalg.norm(named - usual)) < SIMILAR
     return made.substance if grey or same else "painted wood" if own.family == "wood" else "painted metal"
 
@@ -460,11 +460,19 @@ OF_STUFF = {
 }  # fmt: skip
 """What parts are of where words name their colour alone."""
 
+WORN_OF = {
+    "fabric": (*OF_STUFF["fabric"], *CLOTHES, "hat", "beret", "turban", "scarf", "bandana", "hood"),
+    "leather": ("boots", "shoes", "belt", "gloves", "sandals"),
+    "fur": ("beard", "moustache", "mustache", "hair", "mane"),
+}  # fmt: skip
+"""What they are of on what is neither cast, carved nor painted."""
+
 DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "silver", "brass", "bronze", "copper", "chrome"])
 """Metals that take colour as metals, or have their own."""
 
-GREYISH = 0.04
-"""Chroma in OKLab of a colour that a bare metal may have."""
+GREYISH, WHITE = 0.04, 0.9
+"""Chroma and lightness in OKLab below which a colour may be that of a bare metal."""
+
 
 def _usual_size(phrases: list[Phrase]) -> float | None:
     """Metres of the thing that is named first, if any, as large as words say."""

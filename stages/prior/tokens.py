@@ -138,9 +138,13 @@ SIMILES = (
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
     (r"\b(?:burnt|burned|scorched|charred) and blackened\b", "charred"),
     (r"\bblackened (?=at|on|along|around|near|in)", "charred "),
+    (r"\b(?:and |but )?(?:worn|rubbed|polished) (?:shiny|smooth|bright)(?: (?:where|from|by) [^,.;]*)?", "with polished edges"),
+    (r"(?:^|\ban? )(slice|wedge|segment|half) of (?:an? |the )?([a-z]+)\b", r"\2 \1"),
+    (r"\b(?:in|on) an? (?:waffle|sugar|wafer) cone\b|(?<=ice cream) cone\b", " with waffle at the lower half"),
     (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
     (r"\bblue and white (?=willow)", ""),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
+    (r"\b([a-z]+) and ([a-z]+) marbled ([a-z]+(?: [a-z]+)?)(?=$|[,.;]| with | and )", r"\1 \3 swirled with \2"),
     (r"\b([a-z]+) and ([a-z]+) marbled\b", r"\1 and \2 swirled"),
     (r"\b(?:8|number eight)[ -]?ball\b", "eight ball"),
 )
