@@ -24,6 +24,7 @@ from stages.light.lookup import REPEAT, look_up
 from stages.light.scene import Scene
 from stages.material.learnt import LearntMaterial
 from stages.material.recipe import Coat, Layer, Mask, Recipe
+from stages.material.residual import Residual
 from stages.prep.options import PrepOptions
 from stages.prep.stage import prep
 from tests.bake.examples import save_material, small_residual
@@ -94,7 +95,7 @@ def test_a_view_is_told_what_is_baked(folder: Path) -> None:
     for view in views.seen:
         surface = views.surface(view, np.arange(len(views.pixels(view))))
         where = (surface.shown, surface.shown_normals, torch.full((len(surface.shown),), 0.002), surface.label)
-        told = Base(learnt.recipe, views).material(learnt.residual, *where).columns().detach().numpy()
+        told = Base(learnt.recipe, views).material(Residual.of(learnt.residual), *where).columns().detach().numpy()
         hits = scene.intersect(*(np.broadcast_to(a, surface.points.shape) for a in rays(views, view, surface.points.numpy())))
         faces |= set(hits.triangle.tolist())
         uv = np.einsum("pk,pkd->pd", hits.barycentric, mesh["uv"][hits.triangle]) * (1, -1) + (0, 1)

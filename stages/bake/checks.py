@@ -17,7 +17,7 @@ from stages.core.texture_sets import TextureSet, triangle_sets
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.scene import Scene
-from stages.light.transport import Quality, light_transport
+from stages.light.transport import Quality, cached_light_set, trace
 
 POINTS = 3000
 """Texels at which light is traced for the correlation."""
@@ -184,8 +184,9 @@ def _neighbours(values: NDArray[np.int32], best: np.ufunc) -> NDArray[np.int32]:
 def baked_light(rows: NDArray[np.float32], surface: Surface, scene: Scene, lights: list[Environment]) -> Check:
     """Correlation of log albedo and log irradiance over some texels: what a light that was baked in would show."""
     points = loose_points(scene, surface)
-    irradiance = sum(transport.E.float() for transport in light_transport(scene, points, lights, RAYS, 0))
-    value = log_correlation(rows[:, :3], irradiance.numpy())  # type: ignore[union-attr]
+    sums = trace(scene, points, cached_light_set(tuple(lights)), RAYS, 0).of_lights(len(lights))
+    irradiance = sums.mean[:, 0].reshape(len(rows), len(lights), 3).sum(1)
+    value = log_correlation(rows[:, :3], irradiance)
     note = "correlation of albedo and light, where 0 is none; under 0.2 either way is usual"
     return Check("Baked light", f"{value:+.2f}", "good" if abs(value) <= 0.2 else "look", note)
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.parallel import compiled, in_parallel
-from stages.material.residual import HASH_PRIMES, OUTPUTS, Residual
+from stages.material.stored import HASH_PRIMES, OUTPUTS, StoredResidual
 
 BLOCK = 256
 """Points that go through the network at a time."""
@@ -20,7 +20,7 @@ TASK = 1 << 18
 PRIME_Y, PRIME_Z = np.uint32(HASH_PRIMES[1]), np.uint32(HASH_PRIMES[2])
 
 
-def evaluate(residual: Residual, points: NDArray[np.float32]) -> NDArray[np.float32]:
+def evaluate(residual: StoredResidual, points: NDArray[np.float32]) -> NDArray[np.float32]:
     """What was learnt at world points.
 
     Args:

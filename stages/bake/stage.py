@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from stages.asset import gltf
@@ -62,7 +61,7 @@ from stages.core.tiles import signed_area
 from stages.light.scene import Scene
 from stages.material.learnt import LearntMaterial
 from stages.material.relief import bounded
-from stages.material.residual import combined
+from stages.material.stored import with_residual
 
 SAID_OF_OPTIONS = ("quality", "steps")
 """Options of `distill` that bake.json repeats."""
@@ -235,8 +234,7 @@ def bake_maps(
         maps = texels.recipe(options.supersample, groups, progress)
         occlusion = occlusion_map(subject.scene, subject.touched, charts, rays, subject.open, progress)
     residual, unseen = known.result()
-    values = combined(*(torch.from_numpy(a) for a in (maps[on_chart][:, :5], residual)))
-    maps[on_chart, :5] = values.numpy()
+    maps[on_chart, :5] = with_residual(maps[on_chart][:, :5], residual)
     progress("padding", 0, 1)
     subject.pad(maps, occlusion)
     height = bounded(maps[..., 5], options.relief) if learnt.recipe.has_relief and options.relief else None

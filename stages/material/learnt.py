@@ -7,18 +7,18 @@ from stages.core.artifact import Artifact
 from stages.core.errors import ArtifactError
 from stages.material.library import Library
 from stages.material.recipe import Recipe
-from stages.material.residual import Residual
+from stages.material.stored import StoredResidual
 from stages.material.substances import LOOKS
 from stages.material.survey import Lookup, Survey
 
 
 @dataclass(frozen=True)
 class LearntMaterial:
-    """recipe: settled on the object. lookup: its survey. residual: logits to add, see `residual.combined`."""
+    """recipe: settled on the object. lookup: its survey. residual: logits to add, see `stored.with_residual`."""
 
     recipe: Recipe
     lookup: Lookup
-    residual: Residual
+    residual: StoredResidual
 
     @staticmethod
     def of(path: Path, made: Artifact, library: Path | None = None) -> "LearntMaterial":
@@ -27,7 +27,7 @@ class LearntMaterial:
         Raises: ArtifactError when header and arrays disagree, or a scan is missing; InputError of the library."""
         try:
             extra = made.provenance.extra
-            recipe, residual = Recipe.from_json(extra["recipe"]), Residual.from_arrays(extra["residual"], made.arrays)
+            recipe, residual = Recipe.from_json(extra["recipe"]), StoredResidual.of(extra["residual"], made.arrays)
         except (KeyError, TypeError, ValueError) as error:
             raise ArtifactError(f"{path}: its material does not fit its header ({error}); distill it again") from error
         looks = {coat.look for coat in recipe.coats}

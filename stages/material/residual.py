@@ -14,7 +14,7 @@ along each axis beyond it, and finite everywhere. Level l divides each axis into
 """
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -22,57 +22,10 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-FEATURES = 2
-"""Features per table entry."""
-
-OUTPUTS = 5
-"""Red, green and blue of the albedo, roughness, metallic."""
-
-MARGIN = 0.03
-"""A recipe's values are kept this far from 0 and 1 before the logit, where the sigmoid has no slope left to learn by."""
+from stages.material.stored import FEATURES, HASH_PRIMES, MARGIN, OUTPUTS, ResidualConfig, StoredResidual
 
 TABLE_SPREAD = 1e-4
 """Table entries start uniform in ± this. Source: Müller et al. 2022, Section 4."""
-
-HASH_PRIMES = (1, 2654435761, 805459861)
-"""Source: Müller et al. 2022, Equation 4."""
-
-
-@dataclass(frozen=True)
-class ResidualConfig:
-    """Sizes of the residual; the defaults are the paper's.
-
-    levels: grids, coarse to fine. log2_entries: most table entries of a level, as a power of two. base: cells along an
-    axis of the coarsest level. growth: ratio of cells between levels. hidden: width of the network's one hidden layer.
-    """
-
-    levels: int = 16
-    log2_entries: int = 19
-    base: int = 16
-    growth: float = 1.4473
-    hidden: int = 64
-
-    @staticmethod
-    def for_detail(spacing: float) -> "ResidualConfig":
-        """The paper's sizes with just enough levels that the finest cell is no longer than `spacing` (world units)."""
-        paper = ResidualConfig()
-        wanted = math.log(max(1.0 / (spacing * paper.base), 1.0)) / math.log(paper.growth)
-        return ResidualConfig(levels=min(1 + math.ceil(wanted), paper.levels))
-
-    def resolution(self, level: int) -> int:
-        """Cells along one axis of a level."""
-        return math.floor(self.base * self.growth**level)
-
-    def entries(self, level: int) -> int:
-        """Table entries of a level."""
-        return min((self.resolution(level) + 1) ** 3, 2**self.log2_entries)
-
-    def layout(self) -> NDArray[np.int64]:
-        """Resolution, first table row and number of rows of every level: (levels, 3)."""
-        counts = [self.entries(level) for level in range(self.levels)]
-        starts = np.cumsum([0, *counts[:-1]])
-        return np.stack([[self.resolution(level) for level in range(self.levels)], starts, counts], 1).astype(np.int64)
-
 
 class Residual(nn.Module):
     """Logits to add at any point, next to 0 before the first step; parameters are float32 and start from `generator`.
@@ -106,15 +59,17 @@ class Residual(nn.Module):
         """The parameters by name, as `stages.core.schemas.MATERIAL` wants them."""
         return {name: value.detach().cpu().numpy().copy() for name, value in self.named_parameters()}
 
+    def stored(self) -> StoredResidual:
+        """Its sizes and numbers."""
+        return StoredResidual(self.config, self.to_arrays())
+
     @staticmethod
-    def from_arrays(config: dict[str, Any], arrays: dict[str, NDArray]) -> "Residual":
-        """The residual that `to_arrays` wrote. Args: config: ResidualConfig as a dict. Raises: ValueError if they disagree."""
-        made = Residual(ResidualConfig(**config), torch.Generator())
+    def of(stored: StoredResidual) -> "Residual":
+        """The residual that was stored; `stored` is its inverse."""
+        made = Residual(stored.config, torch.Generator())
         with torch.no_grad():
             for name, parameter in made.named_parameters():
-                if arrays[name].shape != tuple(parameter.shape):
-                    raise ValueError(f"'{name}' is {arrays[name].shape}, expected {tuple(parameter.shape)}")
-                parameter.copy_(torch.from_numpy(arrays[name]))
+                parameter.copy_(torch.from_numpy(stored.arrays[name]))
         return made
 
     def config_dict(self) -> dict[str, Any]:

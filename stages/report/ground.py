@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
+from stages.bake.evaluate import evaluate as evaluate_residual
 from stages.bake.raster import Surface, covered_samples, joined
 from stages.bake.sizes import sized
 from stages.bake.stage import subjects
@@ -28,7 +29,7 @@ from stages.light.scene import Scene
 from stages.light.transport import Quality, light_transport
 from stages.material.evaluate import evaluate
 from stages.material.learnt import LearntMaterial
-from stages.material.residual import combined
+from stages.material.stored import with_residual
 
 TEXELS = 16_000
 """Texels that are looked at, of all that a view saw."""
@@ -82,8 +83,7 @@ class Ground:
         learnt = LearntMaterial.of(path, load_npz(path, MATERIAL))
         surface = learnt.lookup.surface(self.point, self.normal, self.footprint, self.label)
         base = np.ascontiguousarray(evaluate(learnt.recipe, surface, learnt.lookup.survey.pieces)[:, :5])
-        with torch.no_grad():
-            return combined(torch.from_numpy(base), learnt.residual(torch.from_numpy(self.point))).numpy()
+        return with_residual(base, evaluate_residual(learnt.residual, self.point))
 
     @cached_property
     def lit(self) -> NDArray[np.int64]:

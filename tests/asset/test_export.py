@@ -6,13 +6,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 
 from stages.asset import export as export_module
 from stages.asset.export import export
 from stages.asset.folder import read_asset
 from stages.asset.options import TARGETS, ExportOptions
-from stages.asset.read_glb import resized
+from stages.asset.read_glb import block_means, resized
 from stages.core.artifact import read_manifest, sha256_file, write_manifest
 from stages.core.errors import ArtifactError, InputError, OutputError
 from stages.core.images import read_image
@@ -395,3 +396,12 @@ def test_a_picture_of_another_size_is_averaged() -> None:
     big = np.arange(64, dtype=np.uint8).reshape(8, 8, 1) * 4
     np.testing.assert_allclose(resized(big, 4, 4)[0, 0, 0], big[:2, :2].mean(), atol=1)
     assert resized(big, 8, 8) is big
+
+
+@pytest.mark.parametrize("step", [2, 3, 8])
+def test_whole_blocks_are_averaged_as_by_openimageio(step: int) -> None:
+    big = np.random.default_rng(0).integers(0, 256, (step * 9, step * 7, 3), np.uint8)
+    roi = oiio.ROI(0, 7, 0, 9, 0, 1, 0, 3)
+    theirs = oiio.ImageBufAlgo.resize(oiio.ImageBuf(big), filtername="box", roi=roi).get_pixels(oiio.UINT8)
+    assert abs(block_means(big, step).astype(int) - theirs.reshape(9, 7, 3)).max() <= 1
+    np.testing.assert_array_equal(resized(big, 7, 9), block_means(big, step))

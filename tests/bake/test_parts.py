@@ -23,7 +23,7 @@ def test_a_border_within_a_chart_is_one_texel_wide() -> None:
     recipe = Recipe(grey, parts=(Part("right", "gold", (1,), Recipe(gold)),))
     layout = Layout.of(arrays["uv"] + np.float32(0.5 / SIZE), SIZE)
     touched = touched_texels(layout)
-    made = LearntMaterial(recipe, Lookup(EMPTY), small_residual())
+    made = LearntMaterial(recipe, Lookup(EMPTY), small_residual().stored())
     maps = Texels(made, corners, arrays["normals"], label, layout, touched).recipe(4, single(touched), silent)
     middle = SIZE // 2  # u = 0.5 and half a texel
     shown = touched.triangle >= 0

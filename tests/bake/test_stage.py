@@ -1,6 +1,8 @@
 """The stage as a whole: its files, their contents, and what it says when it cannot."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -177,6 +179,16 @@ def test_the_same_request_is_up_to_date_and_force_gives_the_same_bytes(constant_
 
 
 @pytest.mark.usefixtures("no_preview")
+def test_a_bake_loads_no_tensors(constant_asset: Path, tmp_path: Path) -> None:
+    """Their import would be a tenth of the command's time."""
+    inputs = f"*(Path({str(constant_asset)!r}) / name for name in ('prep.npz', 'material.npz'))"
+    options = "BakeOptions(size=512, supersample=1, preview_size=32, occlusion_rays=1)"
+    call = f"bake({inputs}, Path({str(tmp_path)!r}), {options}); print('torch' in sys.modules)"
+    code = f"import sys; from stages.bake.stage import *; from stages.bake.options import BakeOptions; {call}"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout == "False\n"
+
+
 def test_another_request_replaces_the_folder_and_takes_its_old_files_away(tmp_path: Path) -> None:
     out = tmp_path / "asset"
     for source_format in ("obj", "ply"):

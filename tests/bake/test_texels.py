@@ -45,7 +45,7 @@ def single(touched: UvSurface) -> Patches:
 
 
 def baked(arrays: dict[str, NDArray], layout: Layout, touched: UvSurface) -> texels.Texels:
-    made = LearntMaterial(EVEN, Lookup(EMPTY), small_residual())
+    made = LearntMaterial(EVEN, Lookup(EMPTY), small_residual().stored())
     label = np.zeros(len(arrays["triangles"]), np.int32)
     return texels.Texels(made, arrays["vertices"][arrays["triangles"]], arrays["normals"], label, layout, touched)
 

@@ -7,6 +7,7 @@ import torch
 from stages.core import parallel
 from stages.core.schemas import MATERIAL
 from stages.material.residual import Residual, ResidualConfig, combined, encode_reference
+from stages.material.stored import StoredResidual, with_residual
 
 SMALL = ResidualConfig(levels=5, log2_entries=12, base=4, growth=1.8, hidden=8)
 
@@ -124,15 +125,24 @@ def test_it_stays_in_range_and_finds_back_from_beyond_the_ends() -> None:
         assert (slope > 0).all()
 
 
+def test_arrays_are_combined_as_tensors_are() -> None:
+    base = torch.rand(400, 5, generator=generator())
+    base[0], base[1] = 0.0, 1.0
+    added = 6 * torch.randn(400, 5, generator=generator(1))
+    added[2], added[3] = 1e4, -1e4
+    found = with_residual(base.numpy(), added.numpy())
+    np.testing.assert_allclose(found, combined(base, added).numpy(), rtol=0, atol=1e-6)
+
+
 def test_arrays_fit_the_schema_and_come_back_equal() -> None:
     made, p = residual(), points(50)
     arrays = made.to_arrays()
     for name, array in arrays.items():
         assert array.dtype == np.float32 and array.ndim == len(MATERIAL.fields[name].shape)
-    again = Residual.from_arrays(made.config_dict(), arrays)
+    again = Residual.of(StoredResidual.of(made.config_dict(), arrays))
     assert torch.equal(again(p), made(p)) and again.config == made.config
     with pytest.raises(ValueError, match="table"):
-        Residual.from_arrays(made.config_dict(), {**arrays, "table": arrays["table"][1:]})
+        StoredResidual.of(made.config_dict(), {**arrays, "table": arrays["table"][1:]})
 
 
 def test_same_seed_same_residual() -> None:
