@@ -6,7 +6,6 @@ square; zoomed crops halve it down to single pixels and are centred on an object
 """
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from stages.core.shading import WIDTH, Transport
-from stages.distill.views import CACHE_BYTES, HALF_MAX, READERS, Surface, Views
+from stages.distill.views import HALF_MAX, Surface, Views
 from stages.light.leaving import OwnLight
 
 WHOLE_VIEW_SHARE = 0.5
@@ -68,14 +67,6 @@ class Sample:
     images: Images | None = None
     rows: Tensor | None = None
     given: Any = None
-
-    def at(self, chosen: Tensor) -> "Sample":
-        """The same of some loose pixels. Args: chosen: (Q,) of the sample's points."""
-        assert self.rows is not None
-        lit = (chosen[:, None] * self.lights + torch.arange(self.lights, device=chosen.device)).flatten()
-        rows = self.rows[chosen.to(self.rows.device)]
-        points, normals, footprint, label = (t[chosen] for t in (self.points, self.normals, self.footprint, self.label))
-        return Sample(points, normals, footprint, label, self.lights, self.transport[lit], rows=rows)
 
 
 class Sampler(Protocol):
@@ -168,26 +159,30 @@ class CropSampler:
         return torch.cat([getattr(part, name) for part in parts]).to(self._device)
 
 
+UNLIT = Transport.unpack(torch.zeros(0, WIDTH))
+"""The light of pixels that are not shaded."""
+
 CELL = 2.0
 """Edge of the cells within which pixels share their chance of being drawn, in pixels."""
 
 
-class PixelSampler:
-    """Loose object pixels of all views, each under every environment at once.
+MOST = 2_000_000
+"""Pixels of a pool: each is solved once, which takes a tenth of a millisecond."""
 
-    The pool holds all of them, or as many of each view as the byte budget allows, chosen at random. Draws are even over
+
+class PixelSampler:
+    """Loose object pixels of all views, without light: for a guidance that knows what they are made of.
+
+    The pool holds all of them, or `MOST`, as large a share of each view, chosen at random. Draws are even over
     the surface, not over the pixels: a crevice that few views see counts as much as a flank that all of them do.
 
-    points, eyes: (M, 3) world, what is seen and the cameras' positions.
+    points, eyes: (M, 3) world, what is seen and the cameras' positions. seen: numbers of the views that see something.
     """
 
-    def __init__(
-        self, views: Views, count: int, generator: torch.Generator, device: torch.device, own: list[OwnLight] | None = None
-    ) -> None:
-        """Args: own: what the object throws on itself, to be added."""
-        self._count, self.device = count, device
-        share = min(1.0, CACHE_BYTES / _pool_bytes(views))
-        rows = [_subset(len(views.pixels(view)), share, generator) for view in views.seen]
+    def __init__(self, views: Views, count: int, generator: torch.Generator, device: torch.device) -> None:
+        self._views, self._count, self.device, self.seen = views, count, device, views.seen
+        share = min(1.0, MOST / sum(len(views.pixels(view)) for view in views.seen))
+        self._rows = rows = [_subset(len(views.pixels(view)), share, generator) for view in views.seen]
         surfaces = [views.surface(view, chosen) for view, chosen in zip(views.seen, rows, strict=True)]
         names = ("points", "shown", "shown_normals", "label")
         self.points, *shown, label = (torch.cat([getattr(s, name) for s in surfaces]) for name in names)
@@ -195,7 +190,6 @@ class PixelSampler:
         self._where = (*shown, torch.cat(widths), label)  # points, normals, footprints and labels of the material
         eyes = views.c2w[views.seen, :3, 3].repeat([len(chosen) for chosen in rows], 0)
         self.eyes = torch.from_numpy(eyes.astype(np.float32))
-        self._lights = _pooled_lights(views, rows, own)  # (M, L, WIDTH)
         self._chance = even_chance(self.points, CELL * views.pixel_size())  # (M,)
 
     def draw(self, generator: torch.Generator) -> Sample:
@@ -205,12 +199,25 @@ class PixelSampler:
     def at(self, rows: Tensor) -> Sample:
         """The sample of given rows (P,) of the pool."""
         points, normals, footprint, label = (t.index_select(0, rows).to(self.device) for t in self._where)
-        lights = self._lights.index_select(0, rows)
-        packed = lights.to(self.device).float().flatten(0, 1)
-        return Sample(points, normals, footprint, label, lights.shape[1], Transport.unpack(packed), rows=rows)
+        return Sample(points, normals, footprint, label, 0, UNLIT, rows=rows)
+
+    def lit(self, number: int, own: list[OwnLight] | None = None) -> tuple[slice, Transport]:
+        """The pool's pixels of one of the seen views: its rows (P of them), and their light transport (P L rows).
+
+        Args: own: what the object throws on itself, to be added.
+        """
+        views, view, rows = self._views, self._views.seen[number], self._rows[number]
+        first = sum(map(len, self._rows[:number]))
+        lights = []
+        for environment in range(len(views.environments)):
+            transport = views.read_transport((view, environment))[torch.from_numpy(rows)]
+            if own is not None:
+                transport = views.with_own_light(own, (view, environment), rows, transport)
+            lights.append(transport.packed().clamp(max=HALF_MAX).half())
+        return slice(first, first + len(rows)), Transport.unpack(torch.stack(lights, 1).float().flatten(0, 1))
 
     def prefetch(self, generator: torch.Generator) -> None:
-        """Nothing to do: the pool is in memory."""
+        """Nothing to do."""
 
 
 def even_chance(points: Tensor, cell: float) -> Tensor:
@@ -222,30 +229,7 @@ def even_chance(points: Tensor, cell: float) -> Tensor:
     return chance / chance[-1]
 
 
-def _pool_bytes(views: Views) -> int:
-    per_pixel = 2 * WIDTH * len(views.environments)
-    return per_pixel * sum(len(views.pixels(view)) for view in views.seen)
-
-
 def _subset(count: int, share: float, generator: torch.Generator) -> NDArray[np.int64]:
     """Ascending indices of a random share of `count` things, one at least."""
     chosen = torch.randperm(count, generator=generator)[: max(1, int(count * share))]
     return chosen.sort().values.numpy()
-
-
-def _pooled_lights(views: Views, rows: list[NDArray[np.int64]], own: list[OwnLight] | None) -> Tensor:
-    """Packed transport of the chosen rows of every view under every environment: (M, L, WIDTH) float16."""
-    starts = np.cumsum([0, *map(len, rows)])
-    pool = torch.empty(int(starts[-1]), len(views.environments), WIDTH, dtype=torch.half)
-
-    def fill(job: tuple[int, int]) -> None:
-        i, environment = job
-        transport = views.read_transport((views.seen[i], environment))[torch.from_numpy(rows[i])]
-        if own is not None:
-            transport = views.with_own_light(own, (views.seen[i], environment), rows[i], transport)
-        pool[starts[i] : starts[i + 1], environment] = transport.packed().clamp(max=HALF_MAX)
-
-    jobs = [(i, e) for i in range(len(views.seen)) for e in range(len(views.environments))]
-    with ThreadPoolExecutor(READERS) as readers:
-        list(readers.map(fill, jobs))
-    return pool

@@ -19,7 +19,6 @@ CONTROL_STEPS = 700 / STEPS
 CONTROL_END = 0.8
 
 BIMODAL_START = 0.5
-PULL_START, PULL_END = 0.2, 0.8
 RATE_HOLD = 0.4
 RATE_END = 0.02
 
@@ -47,11 +46,6 @@ def control_scale(progress: float) -> float:
 def bimodal(progress: float) -> float:
     """Share of the weight that pulls metallic to 0 or 1: nothing in the first half, then growing to all of it."""
     return _ramp(progress, BIMODAL_START, 1.0)
-
-
-def plain(progress: float) -> float:
-    """Share of the pull towards plain materials: sets in once metals have formed, and is gone before the end."""
-    return 0.0 if progress < PULL_START else 1.0 - _ramp(progress, PULL_START, PULL_END)
 
 
 def learning_rate(progress: float) -> float:

@@ -22,9 +22,7 @@ from stages.core.shading import Material, Transport, shade
 from stages.distill import checkpoint, regularizers, schedule
 from stages.distill.base import Base
 from stages.distill.checkpoint import State, step_generator
-from stages.distill.gauss_newton import logit_gradient, proposal
-from stages.distill.guidance.base import Budget, Guidance, Response
-from stages.distill.leaps import UNTIL, leaps
+from stages.distill.guidance.base import Budget, Guidance
 from stages.distill.like import Like, read_like
 from stages.distill.moves import Moves, told
 from stages.distill.optimizer import RowAdam
@@ -117,6 +115,7 @@ def _distill(
         return DistillResult(budget.steps, 0, math.nan, True)
     with run_log(out) as log:
         base = Base(guidance.recipe, views)
+        guidance.begin(progress)
         state = new_state(options, views, device, base.recipe)
         resumed = state.step if not force and checkpoint.resume(out, state, request) else 0
         clock = Clock(state.seconds[-1] if resumed else 0.0)
@@ -176,8 +175,8 @@ def make_guidance(
         asset = TexturedModel(options.reference, views.to_world)
         chosen = step_generator(options.seed, POOL)
         thrown = None if views.bounces is None else views.bounces.solved(reference.material_of(asset, views.bounces))
-        pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device, thrown)
-        return reference.ReferenceGuidance(asset, pool)
+        pool = PixelSampler(views, reference.PIXELS * options.batch, chosen, device)
+        return reference.ReferenceGuidance(asset, pool, thrown)
     if options.guidance not in ("prior", "sd"):
         raise InputError(f"--guidance {options.guidance}: unknown; expected prior, sd or reference")
     if not options.prompt.strip():
@@ -299,20 +298,15 @@ def optimisation_step(run: Run, shown: Shown) -> float:
         moved = state.moves(base, shown.shares) if run.guidance.held else torch.zeros_like(learnt)
         material = Material.of(combined(base, learnt + moved))
     with clock("shading"):
-        radiance = shade(shown.transport, material)
+        seen = shade(shown.transport, material) if run.guidance.looks else material.columns()
     with clock("guidance"):
-        response = run.guidance.respond(radiance.detach(), sample, run.progress, generator)
+        response = run.guidance.respond(seen.detach(), sample, run.progress, generator)
     if not (math.isfinite(response.loss) and bool(torch.isfinite(response.gradient).all())):
         raise NumericalError(_not_finite(state.step, sample, run.views, options.seed))
     with clock("backward"):
         steady = Material.of(combined(base, learnt + moved.detach()))
         losses = _regularizers(Learnt(material, steady, shown.shares, learnt, nearby), sample, run)
-        if response.curvature is None:
-            pull(radiance, response.gradient, losses)
-        else:
-            values = material.columns()
-            goal = _goal(run, response, sample, values.detach(), generator)
-            pull(values, logit_gradient(values.detach(), goal), losses)
+        pull(seen, response.gradient, losses)
     with clock("optimiser"):
         state.optimizer.step(run.budget.learning_rate * schedule.learning_rate(run.progress))
     return response.loss
@@ -324,20 +318,6 @@ def pull(values: Tensor, gradient: Tensor, losses: list[Tensor]) -> None:
     As one number: gradients that are given as tensors make torch load its symbolic algebra, which takes a second.
     """
     sum(losses, (values * gradient).sum()).backward()
-
-
-def _goal(run: Run, response: Response, sample: Sample, values: Tensor, generator: torch.Generator) -> Tensor:
-    """Where a response of least squares sends the material of every point: (P, 5)."""
-    goal = (values + proposal(sample.transport, Material.of(values), response, run.progress)).clamp(0.0, 1.0)
-    if run.progress >= UNTIL:
-        return goal
-
-    def ask(radiance: Tensor, part: Sample) -> Response:
-        return run.guidance.respond(radiance, part, run.progress, generator)
-
-    rows, elsewhere = leaps(sample, values, response, ask, run.progress, generator)
-    goal[rows] = elsewhere
-    return goal
 
 
 def _residuals(

@@ -29,6 +29,5 @@ def test_learning_rate_is_held_then_falls_to_its_end() -> None:
     assert rates[-1] == pytest.approx(schedule.RATE_END, rel=0.01)
 
 
-def test_pulls_on_metallic_set_in_late_and_the_one_to_dielectrics_ends() -> None:
+def test_the_pull_on_metallic_sets_in_late() -> None:
     assert schedule.bimodal(0.4) == 0 and schedule.bimodal(1.0) == 1
-    assert schedule.plain(0.1) == 0 and schedule.plain(0.8) == 0 and schedule.plain(0.2) == 1

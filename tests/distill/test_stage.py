@@ -51,7 +51,7 @@ def options(folder: Path, **changes: object) -> DistillOptions:
 
 def interrupt_at(step: int, action: Callable[[], None]) -> Callable[[str, int, int], None]:
     def progress(what: str, done: int, total: int) -> None:
-        if done == step:
+        if what.startswith("distill") and done == step:
             action()
 
     return progress

@@ -92,18 +92,19 @@ def test_pool_holds_every_pixel_under_every_light(folder: Path) -> None:
     views = Views(folder)
     pool = PixelSampler(views, 50, generator(), CPU)
     assert len(pool.points) == sum(len(views.pixels(view)) for view in views.seen)
-    first = len(views.pixels(0))
-    sample = pool.at(torch.tensor([3, first + 5]))
-    assert sample.lights == len(LIGHTS) and len(sample.transport.E) == 2 * len(LIGHTS)
+    rows, transport = pool.lit(1)
+    assert (rows.start, rows.stop) == (len(views.pixels(0)), len(views.pixels(0)) + len(views.pixels(1)))
+    assert torch.equal(pool.points[rows], views.surface(1, np.arange(len(views.pixels(1)))).points)
     for light in range(len(LIGHTS)):
-        assert torch.equal(sample.transport.A[light], views.transport(0, light).A[3].float())
-        assert torch.equal(sample.transport.A[len(LIGHTS) + light], views.transport(1, light).A[5].float())
+        assert torch.equal(transport.A[light :: len(LIGHTS)], views.transport(1, light).A.float())
 
 
-def test_pool_keeps_to_its_byte_budget(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("stages.distill.sampling.CACHE_BYTES", 40_000)
+def test_pool_holds_no_more_than_it_may(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("stages.distill.sampling.MOST", 100)
     pool = PixelSampler(Views(folder), 50, generator(), CPU)
-    assert 0 < len(pool.points) * len(LIGHTS) * 2 * 58 <= 40_000
+    rows, transport = pool.lit(len(pool.seen) - 1)
+    assert 90 < len(pool.points) <= 100 == pytest.approx(rows.stop, abs=10)
+    assert len(transport.E) == (rows.stop - rows.start) * len(LIGHTS)
 
 
 def broken(folder: Path, tmp_path: Path) -> Path:

@@ -14,6 +14,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from stages.core.progress import Progress
 from stages.core.shading import light_maps
 from stages.distill.guidance.base import Budget, Response
 from stages.distill.guidance.csd import Weights, chosen_weights, distillation_score
@@ -53,7 +54,7 @@ class PriorGuidance:
     ) -> None:
         self.sampler, self._begin = sampler, begin
         self.identity: dict[str, Any] = prior.identity
-        self.held = True
+        self.held, self.looks = True, True
         self.inputs = {"prior": prior.identity["weights"]}
         self.budget, self.weights = BUDGET, chosen_weights(options, OWN)
         self._prior, self._options = prior, options
@@ -65,6 +66,9 @@ class PriorGuidance:
     def recipe(self) -> Recipe:
         """Found when first asked for: a run that is up to date never does."""
         return self._begin()
+
+    def begin(self, progress: Progress) -> None:
+        """Nothing to do."""
 
     def draw(self, generator: torch.Generator) -> Sample:
         """See `Guidance.draw`."""

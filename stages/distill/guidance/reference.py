@@ -1,54 +1,55 @@
 """Reference guidance: the target is the known material of a textured model of the same shape.
 
-Every shown pixel is shaded once with the field's material and once with the true one, by the same light transport
-under all lights at once, and compared on a logarithmic scale. This is inverse rendering with a perfect denoiser: the
-honest test of shading and gradients, and a way to carry textures over to new UVs.
+Every pixel is lit once with the true material, and its material is found again from that radiance under all lights at once
+(`stages.distill.solve`). Each step then brings the field nearer to what its pixels were found to be of: where many pixels
+show one place they vote, each with as much weight as what it saw is worth. This is inverse rendering with a perfect denoiser:
+the honest test of shading, and a way to carry textures over to new UVs.
 """
-
 
 import torch
 from torch import Tensor
 
 from stages.core.artifact import sha256_file
 from stages.core.errors import InputError
-from stages.core.shading import Material, shade
-from stages.distill import schedule
+from stages.core.progress import Progress
+from stages.core.shading import Material, Transport, shade
 from stages.distill.bounces import Bounces
 from stages.distill.guidance.base import Budget, Response
 from stages.distill.sampling import PixelSampler, Sample
+from stages.distill.solve import solved
+from stages.light.leaving import OwnLight
 from stages.light.textured_model import TexturedModel
 from stages.material.recipe import EVEN
 
-PIXELS = 1024
-"""Pixels a step for each image of the batch: many small steps get further in a given time than few large ones."""
+PIXELS = 4096
+"""Pixels a step for each image of the batch."""
 
-BUDGET = Budget(steps=16_000, learning_rate=0.02)
+BUDGET = Budget(steps=2000, learning_rate=0.02)
 
 MAX_MISSED = 0.05
 """With a larger share of points off the reference's surface the two are taken for different shapes."""
 
-CHUNK = 16384
-"""Pixels whose target is shaded at once."""
-
-HUBER = 0.1
-"""Residual, in nepers of radiance, beyond which the loss grows linearly."""
-
-PLAIN = 0.1
-"""Step towards a rough dielectric where nothing else is seen. A grey of albedo c < F0 and metallic m looks exactly like its
-twin of albedo F0 (1 - m) and metallic 1 - c / F0: a dark dielectric like some metal. Of such twins the duller is taken."""
-
 FLOOR = 0.001
-"""Radiance at which the logarithmic scale turns linear, as a share of the light's mean over all seen pixels. The target
+"""Radiance at which the logarithmic scale turns linear, as a share of the light's mean over a view. The target
 holds no noise, so that what lies deep in the shade tells as much as what lies in the light."""
+
+FARTHEST = 0.1
+"""Distance of a material's value from what was found beyond which the pull grows no more: what is wrong is outvoted."""
+
+LEAST_SLOPE = 1e-4
+"""m (1 - m) is taken no smaller when dividing by a sigmoid's slope."""
 
 
 class ReferenceGuidance:
-    """Pulls the rendered pixels towards those of the reference asset.
+    """Pulls the material of pixels towards what their radiance on the reference asset says.
+
+    truth, material: (M, 5) of the pool's pixels, as they are and, once begun, as found. Args: own: what the object throws on
+    itself.
 
     Raises: InputError when the asset cannot be read or is of another shape.
     """
 
-    def __init__(self, asset: TexturedModel, sampler: PixelSampler) -> None:
+    def __init__(self, asset: TexturedModel, sampler: PixelSampler, own: list[OwnLight] | None = None) -> None:
         truth, found = asset.material_at(sampler.points.numpy(), sampler.eyes.numpy())
         if (missed := 1 - found.mean()) > MAX_MISSED:
             raise InputError(
@@ -58,30 +59,34 @@ class ReferenceGuidance:
         self.sampler = sampler
         self.inputs = {"reference": sha256_file(asset.path)}
         self.identity = {"name": "reference", "asset": asset.path.name}
-        self.recipe, self.held = EVEN, False
+        self.recipe, self.held, self.looks = EVEN, False, False
         self.budget, self.weights = BUDGET, None
-        self._found = torch.from_numpy(found)
-        self._target = _target_radiance(sampler, torch.from_numpy(truth))  # (M, L, 3)
-        self._floor = FLOOR * self._target.mean((0, 2))  # (L,)
+        self.truth, self._own = torch.from_numpy(truth), own
+        self._trust = torch.from_numpy(found).half()[:, None, None].repeat(1, 5, 5)
+        self.material = torch.zeros(len(truth), 5)
+
+    def begin(self, progress: Progress) -> None:
+        """See `Guidance.begin`: solves every pixel of the pool."""
+        views = len(self.sampler.seen)
+        for view in range(views):
+            rows, transport = self.sampler.lit(view, self._own)
+            radiance = _radiance(transport, self.truth[rows])
+            found = solved(transport, radiance, FLOOR * radiance.mean((0, 2)))
+            self.material[rows] = found.material
+            self._trust[rows] *= found.trust.half()
+            progress("solve", view + 1, views)
 
     def draw(self, generator: torch.Generator) -> Sample:
         """See `Guidance.draw`."""
         return self.sampler.draw(generator)
 
-    def respond(self, radiance: Tensor, sample: Sample, progress: float, generator: torch.Generator) -> Response:
-        """See `Guidance.respond`; the number for the curve is the mean absolute residual, in nepers."""
+    def respond(self, material: Tensor, /, sample: Sample, progress: float, generator: torch.Generator) -> Response:
+        """See `Guidance.respond`; the number for the curve is the mean distance, as far as it is trusted."""
         assert sample.rows is not None
-        device = radiance.device
-        floor = self._floor.to(device)[:, None]
-        shown = radiance.view(-1, sample.lights, 3) + floor
-        target = self._target.index_select(0, sample.rows).to(device) + floor
-        found = self._found[sample.rows].to(device)[:, None, None]
-        residual = torch.log(shown / target) * found
-        weight = (HUBER / residual.abs().clamp(min=HUBER)) / residual.numel()  # 1 up to HUBER, then falling
-        weight = weight * found
-        gradient, curvature = weight * residual / shown, weight / shown.square()
-        plain = PLAIN * schedule.plain(progress)
-        return Response(gradient.flatten(0, 1), float(residual.abs().mean()), curvature.flatten(0, 1), plain)
+        goal, trust = (t[sample.rows].to(material) for t in (self.material, self._trust))
+        away = (trust @ (material - goal)[..., None])[..., 0]
+        pull = away.clamp(-FARTHEST, FARTHEST) / len(away)
+        return Response(pull / (material * (1 - material)).clamp(min=LEAST_SLOPE), float(away.abs().mean()))
 
 
 ASIDE = 0.01
@@ -94,11 +99,6 @@ def material_of(asset: TexturedModel, cells: Bounces) -> Tensor:
     return torch.from_numpy(asset.material_at(points, eyes)[0])
 
 
-def _target_radiance(sampler: PixelSampler, truth: Tensor) -> Tensor:
-    """Radiance (M, L, 3) of the whole pool with the true material (M, 5), in float32."""
-    parts = []
-    for rows in torch.arange(len(truth)).split(CHUNK):
-        sample, material = sampler.at(rows), truth[rows].to(sampler.device)
-        radiance = shade(sample.transport, Material.of(material))
-        parts.append(radiance.view(-1, sample.lights, 3).cpu())
-    return torch.cat(parts)
+def _radiance(transport: Transport, material: Tensor) -> Tensor:
+    """(P, L, 3) of points with their true material (P, 5)."""
+    return shade(transport, Material.of(material)).unflatten(0, (len(material), -1))

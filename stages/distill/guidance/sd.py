@@ -15,6 +15,7 @@ import torch
 from torch import Tensor
 
 from stages.core.errors import InputError
+from stages.core.progress import Progress
 from stages.core.shading import light_maps
 from stages.distill import schedule
 from stages.distill.guidance.base import Budget, Response
@@ -51,12 +52,15 @@ class StableDiffusionGuidance:
         self.sampler = sampler
         self.identity: dict[str, Any] = model.identity
         self.inputs: dict[str, str] = model.hashes
-        self.recipe, self.held = EVEN, False
+        self.recipe, self.held, self.looks = EVEN, False, True
         self.budget, self.weights = BUDGET, chosen_weights(options, CSD)
         self._model, self._given = model, options.score.given
         self._regions = regions
         prompts = [f"{prompt}, {words}" for prompt in (options.prompt, *regions.prompts) for words in VIEW_WORDS]
         self._text = model.embed(["", options.score.negative_prompt, *prompts])  # (2 + 4 K, T, D) of K prompts
+
+    def begin(self, progress: Progress) -> None:
+        """Nothing to do."""
 
     def draw(self, generator: torch.Generator) -> Sample:
         """See `Guidance.draw`."""
