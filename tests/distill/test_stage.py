@@ -26,7 +26,7 @@ from stages.distill.views import Views
 from stages.light.textured_model import TexturedModel
 from stages.material.evaluate import evaluate
 from stages.material.learnt import LearntMaterial
-from stages.material.residual import combined
+from stages.material.residual import Residual, combined
 from tests.conftest import Golden
 from tests.distill.examples import label_at, painted_sphere, write_conditions
 
@@ -78,7 +78,7 @@ def learnt_at(path: Path, points: torch.Tensor) -> Material:
     normals, footprint = torch.nn.functional.normalize(points), np.full(len(points), 1e-3, "f4")
     surface = learnt.lookup.surface(points.numpy(), normals.numpy(), footprint, label_at(points.numpy()))
     base = torch.from_numpy(evaluate(learnt.recipe, surface)[:, :5])
-    return Material.of(combined(base, learnt.residual(points)))
+    return Material.of(combined(base, Residual.of(learnt.residual)(points)))
 
 
 def test_golden(folder: Path, tmp_path: Path, golden: Golden) -> None:
