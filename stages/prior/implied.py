@@ -60,6 +60,9 @@ def _heads(phrases: list[Phrase]) -> None:
         if part in FACIAL and not phrase.within:
             phrase.region = Region("front", FACIAL[part])
             phrase.within = Phrase(region=Region("above", 0.28), where="head")
+        elif part in NECKS and not phrase.within:
+            phrase.region = Region("below", 0.74)
+            phrase.within = Phrase(region=Region("above", 0.4), where="neck")
         elif part in SHOULDERED and not phrase.within:
             phrase.within = Phrase(region=Region("above", 0.4), where="shoulders")
 
@@ -67,6 +70,7 @@ def _heads(phrases: list[Phrase]) -> None:
 FACIAL = {"beard": 0.45, "moustache": 0.3, "visor": 0.45, "mask": 0.45, "eyes": 0.25, "goggles": 0.35, "faceplate": 0.45}
 """Parts in front of a head, and how far back they reach."""
 
+NECKS = ("scarf", "necklace", "neckerchief", "bandana", "collar")
 SHOULDERED = ("pads", "pad", "pauldrons", "pauldron", "guards", "plates", "epaulettes")
 
 

@@ -190,6 +190,13 @@ def _shared_between(whole: Phrase, marks: Phrase) -> bool:
     return two_tone and not (whole.colors or whole.region or whole.animal)
 
 
+def _both_of(first: Phrase, second: Phrase) -> bool:
+    """Whether a thing of two colours is of the stuff that is named after the second: "a chair in black and red leather"."""
+    dyed = first.thing and not (first.substance or first.region or first.animal) and any(map(is_hue, first.colors))
+    other = second.substance and any(map(is_hue, second.colors)) and not (second.region or second.thing or second.part)
+    return bool(dyed and other) and second.join.kind == "and" and family(second.substance) in ("leather", "fabric", "plastic")
+
+
 def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
     """Colours side by side share what follows: "red and white striped canvas", "white with red and blue stripes"."""
     phrases = _on_ground(phrases)
@@ -197,6 +204,8 @@ def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
         first, second = phrases[number], phrases[number + 1]
         if first.join.kind == second.join.kind == "half":
             first.region, first.where = Region("left", 0.5), "half"
+        if number == 0 and _both_of(first, second):
+            first.substance = second.substance
         if not first.color_only or first.region or second.join.kind not in ("and", "comma", "fade", "half"):
             continue
         second.finish = second.finish or list(first.finish)

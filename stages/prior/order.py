@@ -150,7 +150,8 @@ def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
         named = phrase.join.kind == "comma" and bool(phrase.substance) and not phrase.part
         if k and not (gathering(over[k - 1].substance) or over[k - 1].weather):
             break
-        whole = (_covers(phrase) or _sawn(phrase, thing)) if named or not k else False
+        painted = not (k or thing.weather or RUSTY & set(thing.thing.split(" "))) and _paints(phrase)
+        whole = (_covers(phrase) or painted or _sawn(phrase, thing)) if named or not k else False
         elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
         if elsewhere or not (whole or (not k and _upholsters(phrase, thing))) or (thing.colors and not named):
             continue
@@ -166,6 +167,15 @@ def _covers(phrase: Phrase) -> bool:
     """Whether what covers a thing is all that one sees of it: leather does, moss does not."""
     gathers = bool(gathering(phrase.substance))
     return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
+
+
+RUSTY = {"rusty", "rusted"}
+
+
+def _paints(phrase: Phrase) -> bool:
+    """Whether a thing is painted all over: "a dresser with white paint"."""
+    paint = phrase.coats and family(phrase.substance) == "paint" and bool(phrase.colors)
+    return paint and phrase.join.kind == "with" and not (phrase.weather or phrase.region)
 
 
 def _sawn(phrase: Phrase, thing: Phrase) -> bool:

@@ -38,7 +38,7 @@ PARTS = _places("part")
 CLOTHES = frozenset([
     "shirt", "tunic", "vest", "jacket", "sweater", "robe", "trousers", "pants", "jeans", "shorts", "skirt", "coat", "waistcoat",
     "hoodie", "jumper", "cardigan", "blouse", "dress", "gown", "kimono", "apron", "overalls", "dungarees", "uniform", "cloak",
-    "cape", "robes", "jumpsuit",
+    "cape", "robes", "jumpsuit", "scarf", "neckerchief", "bandana",
 ])  # fmt: skip
 """Parts of who wears them; of cloth, but on what is cast, carved or painted."""
 
@@ -91,6 +91,9 @@ PARTS_OF = _of_things(
     ("handbag, purse, shoulder bag, clutch",
      dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
     ("cannon, howitzer, carronade, mortar", dict.fromkeys(("carriage", "wheels"), Region("below", 0.45))),
+    ("apple, red apple, green apple, pear, pumpkin, cherry, cherries, tomato, orange, lemon, peach, plum, strawberry, melon, "
+     "pepper, pineapple", {**dict.fromkeys(("stem", "stalk"), Region("above", 0.08)),
+                   **dict.fromkeys(("leaf", "leaves", "crown"), Region("above", 0.25))}),
     ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
     ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
      {"roof": Region("above", 0.2), **dict.fromkeys(("wheels", "rims", "hubcaps", "alloys"), Region("below", 0.25)),

@@ -190,7 +190,8 @@ class Reading:
         for word in _weathers(phrase):
             weather = WEATHER[word]
             coat = self._named(weather.stuff) if weather.stuff else self._beneath(base, None)
-            layers.append(Layer(coat, (replace(where, wear=1.0),), weather.thickness, weather.strength))
+            stains = (weather.region.mask(word),) if weather.region.kind in ("patches", "streaks") else ()
+            layers.append(Layer(coat, (replace(where, wear=1.0), *stains), weather.thickness, weather.strength))
         return layers
 
     def _region(self, phrase: Phrase) -> Region:
@@ -202,6 +203,8 @@ class Reading:
         gathers = GATHERS.get(gathering(phrase.substance))
         if gathers and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", min(0.45, gathers.share) if gathers.kind == "up" else 0.45, gathers.size, gathers.wear)
+        if phrase.where in ("on top", "on the top") and phrase.substance and _family(phrase) == "organic" and not gathers:
+            return Region("up", 0.4)  # "a cake with strawberries on top"
         if gathers and phrase.region and phrase.region.kind == "all":
             return gathers  # "ivy climbing the walls"
         if phrase.region:
@@ -251,7 +254,7 @@ class Reading:
         if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
         part = phrase.where.split(" ")[-1]
-        worn = beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal")
+        worn = beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal", "ice")
         of_part = next((name for name, parts in (OF_STUFF | (WORN_OF if worn else {})).items() if part in parts), "")
         if phrase.colors and of_part:
             return self._of(stuff(of_part, True), phrase)
@@ -456,7 +459,7 @@ OF_STUFF = {
     "rubber": ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires"),
     "fabric": ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
                "sails", "tie", "bowtie", "necktie"),
-    "glass": ("lens", "lenses", "window", "windows", "windshield", "windscreen"),
+    "glass": ("lens", "lenses", "window", "windows", "windshield", "windscreen", "panes", "pane", "liquid"),
 }  # fmt: skip
 """What parts are of where words name their colour alone."""
 

@@ -141,6 +141,7 @@ SIMILES = (
     (r"\b(?:and |but )?(?:worn|rubbed|polished) (?:shiny|smooth|bright)(?: (?:where|from|by) [^,.;]*)?", "with polished edges"),
     (r"(?:^|\ban? )(slice|wedge|segment|half) of (?:an? |the )?([a-z]+)\b", r"\2 \1"),
     (r"\b(?:in|on) an? (?:waffle|sugar|wafer) cone\b|(?<=ice cream) cone\b", " with waffle at the lower half"),
+    (r"\b(?:(?:in|with) )?(?:an? )?sunburst(?: finish)?\b", "glossy orange with dark brown edges"),
     (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
     (r"\bblue and white (?=willow)", ""),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
@@ -349,6 +350,8 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("thing", token.text)  # "an orange"
         elif token.text in ("shell", "carapace") and any(t.text in BEARERS for t in result):
             token = Token("part", "carapace", PARTS["carapace"])
+        elif token.text == "shell" and any(t.kind in ("thing", "part") for t in result):
+            token = Token("part", "body", PARTS["body"])  # "a helmet with a white shell"
         elif token.kind == "thing" and token.text in KNOWN and _is_stuff(token, ahead, behind):
             token = Token("substance", token.text)
         elif token.kind == "part" and token.text in WORN & OBJECTS.keys() and not any(t.kind == "thing" for t in result):
