@@ -270,7 +270,8 @@ def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     bare = before.thing and not (before.substance or before.colors or before.unknown)
     dull = bool(before.substance) and not before.metal
     hue = phrase.color_only or (dull and phrase.substance in COLORS and not (phrase.colors or phrase.unknown or phrase.finish))
-    unsaid = hue and bool(before.substance or before.unknown) and not before.colors and not before.region
+    whole = not before.region or before.region.kind == "all"
+    unsaid = hue and bool(before.substance or before.unknown) and not before.colors and whole
     gathers = bool(gathering(phrase.substance))
     return bool(bare and phrase.says_what and not gathers) or unsaid
 

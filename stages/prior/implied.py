@@ -8,12 +8,12 @@ from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, is_hue
 from stages.prior.places import GATHERS, HEADED, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import ROOFS
-from stages.prior.tokens import singulars
+from stages.prior.tokens import Join, singulars
 
 
 def implied(phrases: list[Phrase]) -> None:
     """Say it, in place. Args: phrases: one or more."""
-    for step in (_alone, _listed, _bodies, _fronts, _heads, _sprinkles, _shade, _scorch, _stuffs):
+    for step in (_alone, _patterned, _listed, _bodies, _fronts, _heads, _sprinkles, _shade, _scorch, _stuffs):
         step(phrases)
 
 
@@ -23,6 +23,18 @@ def _alone(phrases: list[Phrase]) -> None:
     thing = next((name for name in (first.where, *singulars(first.where)) if name in OBJECTS), "")
     if not first.says_what and thing and len(phrases) == 1:
         phrases[0] = replace(first, thing=thing, region=None, where="")
+
+
+def _patterned(phrases: list[Phrase]) -> None:
+    """A pattern of which no colour is said is darker than what it lies on: "a striped pullover"."""
+    first = phrases[0]
+    plain = bool(first.thing) and not (first.animal or first.within) and first.where in PLAIN_PATTERNS
+    if len(phrases) == 1 and plain and first.region:
+        phrases.append(Phrase(Join("with"), colors=["dark"], region=first.region, where=first.where))
+        first.region, first.where = None, ""
+
+
+PLAIN_PATTERNS = ("striped", "stripes", "spotted", "spots", "dotted", "polka dot", "polka dots")
 
 
 def _listed(phrases: list[Phrase]) -> None:
@@ -96,6 +108,7 @@ USUAL = {
     **dict.fromkeys(("tyres", "tires", "tyre", "tire"), ("rubber", ["black"])),
     **dict.fromkeys(("stand", "tripod"), ("black iron", [])),
     **dict.fromkeys(("windows", "windshield", "windscreen", "lens", "lenses"), ("glass", [])),
+    **dict.fromkeys(("cushion", "cushions", "pillow", "pillows", "sail", "sails", "curtains"), ("fabric", ["cream"])),
     "jeans": ("denim", []), **dict.fromkeys(("pages", "page edges"), ("paper", ["cream"])),
 }  # fmt: skip
 """Parts that are of the same stuff on all things, where none is said: its name and colours."""

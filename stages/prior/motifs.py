@@ -22,7 +22,8 @@ def _on_color(phrases: list[Phrase]) -> list[Phrase]:
     first, marks, ground, *rest = phrases
     bare = bool(first.thing) and not (any(map(is_hue, first.colors)) or first.animal or first.region)
     hue = ground.join.kind == "on" and ground.color_only and not ground.region
-    if bare and hue and marks.where in SHAPES and marks.says_what:
+    badge = marks.region is not None and marks.region.kind == "badge"
+    if bare and hue and (marks.where in SHAPES or badge) and marks.says_what:
         return [replace(first, colors=[*ground.colors, *first.colors]), marks, *rest]
     return phrases
 

@@ -35,8 +35,16 @@ def _stands(first: Phrase, second: Phrase) -> bool:
     if second.join.kind in ("peel", "through"):
         return False  # "paint peeling off a door"
     part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
-    thing = bool(first.thing and first.substance) and second.join.kind == "on" and not second.thing
+    solid = bool(second.thing) and _family_made(second) in ("wood", "metal", "stone") and bool(_family_made(first))
+    rests = (bool(first.substance) and not second.thing) or solid or bool(second.part)
+    thing = bool(first.thing) and second.join.kind == "on" and rests
     return (part or thing) and not first.region and not gathering(first.substance)
+
+
+def _family_made(phrase: Phrase) -> str:
+    """The family of a thing's stuff, as it is said or usual."""
+    stuff = phrase.substance or split(OBJECTS[phrase.thing].made)[0].substance
+    return family(stuff) if stuff else ""
 
 
 LARGE = 0.5
@@ -115,7 +123,7 @@ def _of_body(first: Phrase, over: list[Phrase]) -> Order:
         return replace(first, colors=body.colors), others  # "a lacquer bowl, red inside, black outside"
     alone = bool(first.thing) and not (first.substance or first.colors or first.unknown)
     if alone:
-        return replace(body, thing=body.thing or first.thing), others
+        return replace(body, thing=body.thing or first.thing, weather=[*first.weather, *body.weather]), others
     if not (first.region or gathering(first.substance) or first.substance in ROOFING):
         first = replace(first, region=Region("above", 0.4))
     return body, [first, *others]

@@ -90,6 +90,8 @@ PARTS_OF = _of_things(
     ("staff, wizard staff, wand, sceptre, scepter, lighthouse, obelisk", {"top": Region("above", 0.14)}),
     ("handbag, purse, shoulder bag, clutch",
      dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
+    ("mug, cup, bottle, tumbler, flask", dict.fromkeys(("sleeve", "sleeves"), Region("middle", 0.5))),
+    ("plate, saucer, platter, dish, tray, coin", {"rim": Region("edges", 0.15, 0.04)}),
     ("cannon, howitzer, carronade, mortar", dict.fromkeys(("carriage", "wheels"), Region("below", 0.45))),
     ("apple, red apple, green apple, pear, pumpkin, cherry, cherries, tomato, orange, lemon, peach, plum, strawberry, melon, "
      "pepper, pineapple", {**dict.fromkeys(("stem", "stalk"), Region("above", 0.08)),

@@ -3,6 +3,7 @@
 Words that a table knows mean what it says. Words that none knows are read by the prior's reader, which was trained on the
 same tables and explains other words by a dictionary, and look like the substance whose name means most nearly the same. """
 
+import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cache
@@ -66,6 +67,9 @@ SIMILAR = 0.2
 
 BESIDE = ("with", "over", "and", "comma", "on")
 """Joins that leave open where a phrase lies."""
+
+STAIN = re.compile("stain|splat|spat|splash|smear")
+"""Words of wear that leave most of a part as it is."""
 
 STRIPS = ("below", "above", "front", "back", "left", "right", "middle")
 """Places that are as high or wide as their word says, however much lies there: "lots of rust near the bottom"."""
@@ -190,7 +194,7 @@ class Reading:
         for word in _weathers(phrase):
             weather = WEATHER[word]
             coat = self._named(weather.stuff) if weather.stuff else self._beneath(base, None)
-            stains = (weather.region.mask(word),) if weather.region.kind in ("patches", "streaks") else ()
+            stains = (weather.region.mask(word),) if STAIN.search(word) else ()
             layers.append(Layer(coat, (replace(where, wear=1.0), *stains), weather.thickness, weather.strength))
         return layers
 
@@ -216,7 +220,7 @@ class Reading:
             return SHAPES["studs"]
         if phrase.substance in ROOFING and phrase.join.kind in ("", *BESIDE):
             return PARTS["roof"]
-        if phrase.part and phrase.join.kind == "on":
+        if (phrase.part or (phrase.thing and phrase.join.beneath)) and phrase.join.kind == "on":
             return PARTS["stand"]  # "a cannon on a wooden carriage"
         if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
             return DETAILS

@@ -142,6 +142,10 @@ SIMILES = (
     (r"(?:^|\ban? )(slice|wedge|segment|half) of (?:an? |the )?([a-z]+)\b", r"\2 \1"),
     (r"\b(?:in|on) an? (?:waffle|sugar|wafer) cone\b|(?<=ice cream) cone\b", " with waffle at the lower half"),
     (r"\b(?:(?:in|with) )?(?:an? )?sunburst(?: finish)?\b", "glossy orange with dark brown edges"),
+    (r"\bwith (?:the )?(?:word |words |text )?[\"']?[a-z]+[\"']? (?:stamped|stencill?ed|printed|written|embossed) "
+     r"(?:on (?:it|the [a-z]+) )?in ([a-z]+)\b", r"with \1 lettering"),
+    (r"(?:,| with| and)(?: (?!thin|gold|silver|copper|brass)[a-z]+){0,2} (?:grout|mortar)(?: lines| joints)?\b(?! )", ""),
+    (r"\bglowing (cracks|veins|fissures)\b", r"bright orange \1"),
     (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
     (r"\bblue and white (?=willow)", ""),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
