@@ -27,7 +27,7 @@ MORE = taught(sorted(KNOWN.keys() - {name for s in SUBSTANCES for name in s.name
 METALS = taught([name for name, found in KNOWN.items() if found[0].metallic])
 GATHERING = taught([name for name in (*GATHERS, *ONCE) if name in KNOWN])
 PAINTS = taught([name for name, found in KNOWN.items() if found[0].family == "paint"])
-MADE = taught([name for name, thing in THINGS.items() if thing.made])
+MADE = [name for name in taught([*THINGS]) if THINGS[name].made and taught([THINGS[name].made])]
 
 MORE_SHARE, COLORED, FINISHED, WORN, BARE_THING, COMPOSED_SHARE = 0.25, 0.75, 0.4, 0.14, 0.08, 0.4
 """Shares: of substances that only the reading of prompts knows; of those that take colours, a colour; of all, a finish, wear;

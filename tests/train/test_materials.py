@@ -8,6 +8,7 @@ from stages.material.recipe import KINDS
 from stages.material.surface import Surface
 from stages.prior.colors import WORDS
 from stages.prior.names import HELD_OUT, SUBSTANCES
+from stages.prior.objects import OBJECTS
 from stages.prior.prompt import Reading
 from stages.prior.vocabulary import split_words
 from stages.train import captions, materials
@@ -57,6 +58,13 @@ def test_captions_follow_their_seed_and_every_wording_is_used() -> None:
         for wording in wordings:
             recipe = Reading(materials.tables()).recipe(wording.format(x="oak", y="green paint"), 0)
             assert {"oak", "paint"} <= {coat.look for coat in recipe.coats}, wording
+
+
+def test_things_that_captions_name_are_of_stuffs_that_tables_know() -> None:
+    """An astronaut is of white nylon, and nylon is a word that is kept for tests."""
+    assert "astronaut" not in captions.MADE and len(captions.MADE) > 1000
+    for made in sorted({OBJECTS[name].made for name in captions.MADE}):
+        Reading(materials.tables()).recipe(made, 0)
 
 
 def test_the_words_kept_for_tests_are_never_taught() -> None:
