@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from stages.core.shading import Material, shade
+from stages.distill.guidance import prior
 from stages.distill.guidance.prior import PriorGuidance
 from stages.distill.options import DistillOptions, ScoreOptions
 from stages.distill.parts import Claim
@@ -152,7 +153,7 @@ class TwoPrior(FlatPrior):
 
 
 def test_each_pixel_follows_its_own_parts_prompt(views: Views) -> None:
-    """Above the gradient is that of a run with the part's prompt alone, below that of the whole's, bit for bit."""
+    """Above the gradient goes where the part's prompt alone would send it, below where the whole's would, up to the border."""
     options = DistillOptions(prompt="flat", batch=2, score=ScoreOptions(negative_prompt="bad", eta1=1.0))
 
     def gradient(prompt: str, *claims: Claim) -> tuple[Any, Tensor, int]:
@@ -166,5 +167,20 @@ def test_each_pixel_follows_its_own_parts_prompt(views: Views) -> None:
     upper = sample.label == 1
     assert 0 < int(upper.sum()) < len(upper) and calls == 1
     for prompt, mine in (("other", upper), ("flat", ~upper)):
-        assert torch.equal(mixed[mine], gradient(prompt)[1][mine])
-        assert not torch.equal(mixed[~mine], gradient(prompt)[1][~mine])
+        alone = gradient(prompt)[1]
+        assert torch.equal(mixed[mine].sign(), alone[mine].sign()) and torch.equal(mixed[~mine].sign(), -alone[~mine].sign())
+
+
+def test_a_score_is_evened_over_the_object_and_over_each_part_by_itself() -> None:
+    """Grain goes, an even score stays to the outline, and nothing crosses from one part to the other."""
+    row, column = torch.meshgrid(torch.arange(32.0), torch.arange(32.0), indexing="ij")
+    disc = (torch.hypot(row - 15, column - 17) < 13).float()
+    left = disc * (column < 16)
+    areas = torch.stack([left, disc - left])[:, None, None]
+    even = 2.0 * left - 1.0 * (disc - left)
+    torch.testing.assert_close(prior.evened(even[None, None], areas)[0, 0], even, rtol=1e-4, atol=1e-5)
+    grain = torch.randn(1, 3, 32, 32, generator=torch.Generator().manual_seed(0))
+    assert prior.evened(grain, areas)[..., disc > 0].std() < 0.15
+    slow = torch.sin(row / 32)
+    kept = prior.evened((disc * slow)[None, None], disc[None, None, None])[0, 0]
+    assert torch.corrcoef(torch.stack([kept[disc > 0], slow[disc > 0]]))[0, 1] > 0.99
