@@ -66,7 +66,7 @@ def conditions(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
               help="Of every distillation.  [default: as `distill`]")
 @click.option("--views", type=click.IntRange(1, 9999), default=PRIOR["views"], show_default=True, help="Cameras of a mesh.")
 @click.option("--ladder/--no-ladder", default=PRIOR["ladder"], show_default=True,
-              help="Also take conditions away from the model, as the paper's ablation does.")
+              help="Also let the model alone hold the material, and take conditions away from it, as the paper does.")
 @common_options
 def prior(mesh: tuple[str, ...], output: Path, common: Common, **chosen: Any) -> None:
     """Judge the embedded prior by a fixed list of prompts on MESH files, or on six shapes of its own.

@@ -6,6 +6,7 @@ What is measured of many materials on one mesh needs its texels and their light 
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -19,11 +20,12 @@ from stages.bake.texels import texel_size
 from stages.bake.visibility import Views, seen_points
 from stages.conditions.stage import read_lights
 from stages.core.artifact import load_npz
+from stages.core.color import luminance
 from stages.core.schemas import CAMERAS, MATERIAL, PREP
 from stages.core.shading import Transport
 from stages.core.texture_sets import texture_sets
 from stages.light.environment import Environment
-from stages.light.gbuffer import GBuffer
+from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.lights import preview_light
 from stages.light.scene import Scene
 from stages.light.transport import Quality, light_transport
@@ -46,13 +48,25 @@ LIFT = 1e-4
 TURNS = (0.0, 0.33, 0.67)
 """Turns of the relighting environment, shares of a circle: three lights that were never trained on."""
 
+PICTURES, PICTURE = 3, 256
+"""Views in which a material is looked at as a picture, and the pixels along their edges."""
+
+
+class Pictures(NamedTuple):
+    """Linear luminance of albedo, (H, W) a view, of a material and of its recipe alone; masks: where the object is."""
+
+    found: list[NDArray[np.float32]]
+    recipe: list[NDArray[np.float32]]
+    masks: list[NDArray[np.bool_]]
+
 
 @dataclass(frozen=True)
 class Ground:
-    """T texel centres. point, normal: (T, 3) world. footprint: (T,) edge of a texel. label: (T,) of the parts. triangle: (T,);
-    barycentric: (T, 3)."""
+    """T texel centres, and the views that saw them. point, normal: (T, 3) world. footprint: (T,) edge of a texel. label: (T,)
+    of the parts. triangle: (T,); barycentric: (T, 3)."""
 
     scene: Scene
+    views: Views
     point: NDArray[np.float32]
     normal: NDArray[np.float32]
     footprint: NDArray[np.float32]
@@ -76,14 +90,31 @@ class Ground:
         some, width = joined(found)[chosen], np.concatenate(widths)[chosen]
         weights = np.c_[some.barycentric, 1 - some.barycentric.sum(1)].astype(np.float32)
         point, normal = some.interpolate(corners), some.interpolate(mesh["normals"])
-        return Ground(subject.scene, point, normal, width, subject.label[some.triangle], some.triangle, weights)
+        return Ground(subject.scene, views, point, normal, width, subject.label[some.triangle], some.triangle, weights)
 
     def material(self, path: Path) -> NDArray[np.float32]:
         """A material as a bake evaluates it, (T, 5) linear. Raises: ArtifactError."""
-        learnt = LearntMaterial.of(path, load_npz(path, MATERIAL))
-        surface = learnt.lookup.surface(self.point, self.normal, self.footprint, self.label)
-        base = np.ascontiguousarray(evaluate(learnt.recipe, surface, learnt.lookup.survey.pieces)[:, :5])
-        return with_residual(base, evaluate_residual(learnt.residual, self.point))
+        return _values(_read(path), self.point, self.normal, self.footprint, self.label)
+
+    def pictures(self, path: Path) -> Pictures:
+        """A material of an object without parts, in some of the views. Raises: ArtifactError."""
+        learnt, found, recipe = _read(path), list[NDArray](), list[NDArray]()
+        for view, footprint in self._seen:
+            at = view.point.astype(np.float32), view.n, footprint, np.zeros(len(footprint), np.int32)
+            for into, values in ((found, _values(learnt, *at)), (recipe, _recipe(learnt, *at))):
+                into.append(np.zeros(view.mask.shape, np.float32))
+                into[-1][view.mask] = luminance(values[:, :3])
+        return Pictures(found, recipe, [view.mask for view, _ in self._seen])
+
+    @cached_property
+    def _seen(self) -> list[tuple[GBuffer, NDArray[np.float32]]]:
+        """Views from all around, and the width of each of their object pixels."""
+        found = []
+        for k in self.views.spread_out()[:PICTURES]:
+            view = trace_view(self.scene, self.views.c2w[k], float(self.views.fov_y[k]), PICTURE, PICTURE)
+            width = 2 * np.tan(float(self.views.fov_y[k]) / 2) / PICTURE
+            found.append((view, (width * view.depth[view.mask]).astype(np.float32)))
+        return found
 
     @cached_property
     def lit(self) -> NDArray[np.int64]:
@@ -112,3 +143,19 @@ class Ground:
         mask, depth = np.ones((1, len(point)), bool), np.ones((1, len(point)), np.float32)
         points = GBuffer(mask, depth, point, point + LIFT * ng, n, ng, n, triangle, weights)
         return light_transport(scene, points, lights, RAYS, 0)
+
+
+def _read(path: Path) -> LearntMaterial:
+    return LearntMaterial.of(path, load_npz(path, MATERIAL))
+
+
+def _recipe(learnt: LearntMaterial, point: NDArray, normal: NDArray, footprint: NDArray, label: NDArray) -> NDArray[np.float32]:
+    """The recipe's material of points, (P, 5) linear."""
+    surface = learnt.lookup.surface(point, normal, footprint, label)
+    return np.ascontiguousarray(evaluate(learnt.recipe, surface, learnt.lookup.survey.pieces)[:, :5])
+
+
+def _values(learnt: LearntMaterial, point: NDArray, normal: NDArray, footprint: NDArray, label: NDArray) -> NDArray[np.float32]:
+    """The same with what was learnt on top."""
+    base = _recipe(learnt, point, normal, footprint, label)
+    return with_residual(base, evaluate_residual(learnt.residual, point))

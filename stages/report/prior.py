@@ -30,9 +30,11 @@ from stages.prep.options import PrepOptions
 from stages.prep.stage import prep
 from stages.report import measures, plots
 from stages.report.conditions import write_csv
+from stages.report.contrast import WAVES
 from stages.report.ground import Ground
+from stages.report.kept import contrast_kept
 from stages.report.options import PriorReportOptions
-from stages.report.prompts import IDENTIFIED, PROMPTS, Prompt
+from stages.report.prompts import IDENTIFIED, LADDER, PROMPTS, Prompt
 from stages.report.shapes import SHAPES
 
 TEXTURE = 512
@@ -73,8 +75,9 @@ class Row:
 
     decided: share of texels that are metal or not. light_correlation: of log albedo and log irradiance. shared_pattern: of log
     albedo with the first seed's, texel by texel. identified: nearest to its own truth of `prompts.IDENTIFIED`. regions: share
-    of a composition's two regions nearer to their own material. relight_percent: tone-mapped RMSE against the ideal
-    material, under lights never trained on.
+    of a composition's two regions nearer to their own material. contrast_kept: percent of the recipe's, at wavelengths of
+    2 … 64 pixels, of the ladder's runs; nan where it has none. relight_percent: tone-mapped RMSE against the ideal material,
+    under lights never trained on.
     """
 
     prompt: str
@@ -98,6 +101,7 @@ class Row:
     shared_pattern: str
     identified: str
     regions: str
+    contrast_kept: str
 
 
 @dataclass(frozen=True)
@@ -126,8 +130,13 @@ def report_prior(out: Path, options: PriorReportOptions, progress: Progress = si
     for i, run in enumerate(runs):
         progress(f"prior: {run.prompt.text}", i, len(runs))
         ground = grounds[run.mesh]
+        made = carry_out(run, out, options)
         twin = ground.material(carry_out(dataclasses.replace(run, seed=0), out, options)) if run.seed else None
-        rows.append(measure(run, ground, ground.material(carry_out(run, out, options)), twin))
+        row = measure(run, ground, ground.material(made), twin)
+        if run.alone:
+            words = carry_out(Run(run.prompt, run.mesh, run.seed), out, options)
+            row = dataclasses.replace(row, contrast_kept=kept(ground, made, words))
+        rows.append(row)
         write_csv(out / "prior.csv", rows)
     progress("prior", len(runs), len(runs))
     summary = [line for line in summarise(rows) if line.runs]
@@ -170,7 +179,7 @@ def plan(options: PriorReportOptions, meshes: dict[str, float]) -> Iterable[Run]
         yield from (Run(prompt, mesh, seed) for prompt, mesh in placed)
     if options.ladder:
         for prompt, mesh in placed:
-            if prompt in IDENTIFIED:
+            if prompt in LADDER:
                 yield from (Run(prompt, mesh, 0, given, alone=True) for given in GIVEN)
                 yield Run(prompt, mesh, 0, lights="one", alone=True)
 
@@ -229,7 +238,14 @@ def measure(run: Run, ground: Ground, maps: NDArray[np.float32], twin: NDArray[n
         shared_pattern="" if twin is None else f"{log_correlation(maps[:, :3], twin[:, :3]):.3f}",
         identified=str(own) if run.prompt in IDENTIFIED else "",
         regions="" if run.prompt.top is None else f"{regions_right(run.prompt, ground.point[:, 2], maps):.2f}",
+        contrast_kept="",
     )
+
+
+def kept(ground: Ground, made: Path, words: Path) -> str:
+    """`contrast_kept` of a material, beside the recipe of one that was held near to it, percent."""
+    found, recipe = ground.pictures(made), ground.pictures(words)
+    return " ".join(f"{100 * share:.1f}" for share in contrast_kept(found.found, recipe.recipe, found.masks))
 
 
 def regions_right(prompt: Prompt, z: NDArray, maps: NDArray) -> float:
@@ -286,6 +302,12 @@ def summarise(rows: list[Row]) -> Iterable[Summary]:
                                  ("d full, one light", "full", "one"), ("e full", "full", "all")):  # fmt: skip
         of = [abs(r.light_correlation) for r in rows if r.alone and (r.given, r.lights) == (given, lights)]
         yield line("baked light, |correlation|", label, of, "")
+    alone = [r for r in rows if r.alone and (r.given, r.lights) == ("full", "all")]
+    yield line("metal or not, %", "e full", [100.0 * r.metal_right for r in alone], ">= 95")
+    yield line("CIEDE2000, median", "e full", [r.color_difference for r in alone], "<= 8", median=True)
+    for k, wave in enumerate(WAVES):
+        shares = [float(r.contrast_kept.split()[k]) for r in alone]
+        yield line("contrast kept, %", f"e full, {wave} pixels", [x for x in shares if not np.isnan(x)], ">= 50")
     yield line("baked light, |correlation|", "one material", [abs(r.light_correlation) for r in one], "<= 0.06")
     yield line("two seeds, distance of means", "all", distances(full), "")
     shared = [abs(float(r.shared_pattern)) for r in one if r.shared_pattern]

@@ -98,3 +98,6 @@ PROMPTS = (
     _new("auburn leather", "#7a3a20", 0.55), _new("taupe wool", "#8a7c70", 0.94),
 )  # fmt: skip
 """All of them: 40 of one taught material, 8 of two, 24 with a word that was never taught."""
+
+LADDER = (*IDENTIFIED, *[p for p in PROMPTS[len(IDENTIFIED) :] if not p.unseen and p.top is None][::2][:14])
+"""Those that the model answers by itself: 24 of one taught material, every second after the first ten."""
