@@ -1,18 +1,18 @@
 """Fast evaluation of the residual, for inference only.
 
 Texels are visited row by row, so neighbouring points mostly share their cells of the coarser grids: a cell's corners
-are fetched once and kept until a point leaves it, and the network runs in the same pass, out of the processor's cache.
+are fetched once and kept until a point leaves it; the network is two products of matrices.
 `Residual.forward` is the plain form of the same; a test holds the two together.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from stages.core.parallel import compiled, in_parallel
+from stages.core.parallel import compiled, in_parallel, slices
 from stages.material.stored import HASH_PRIMES, OUTPUTS, StoredResidual
 
-BLOCK = 256
-"""Points that go through the network at a time."""
+BLOCK = 1 << 12
+"""Points that go through the network at a time, so that what is between its layers stays in the cache."""
 
 TASK = 1 << 18
 """Points of one thread's task."""
@@ -32,27 +32,25 @@ def evaluate(residual: StoredResidual, points: NDArray[np.float32]) -> NDArray[n
     w0, b0, w1, b1 = (arrays[name] for name in ("weights_0", "bias_0", "weights_1", "bias_1"))
     result = np.empty((len(points), OUTPUTS), np.float32)
 
-    def part(start: int) -> None:
-        rows = slice(start, start + TASK)
-        _evaluate(points[rows], arrays["table"], layout, w0, b0, w1, b1, result[rows])
+    def part(rows: slice) -> None:
+        features = np.empty((w0.shape[1], len(points[rows])), np.float32)
+        _encode(points[rows], arrays["table"], layout, features)
+        for some in slices(features.shape[1], BLOCK):
+            hidden = w0 @ features[:, some]
+            hidden += b0[:, None]
+            np.maximum(hidden, 0, out=hidden)
+            result[rows][some] = (w1 @ hidden).T + b1
 
-    in_parallel(part, range(0, len(points), TASK))
+    in_parallel(part, slices(len(points), TASK))
     return result
 
 
 @compiled
-def _evaluate(points, table, layout, w0, b0, w1, b1, result):  # type: ignore[no-untyped-def]
-    features = np.empty((w0.shape[1], len(points)), np.float32)
-    for level in range(len(layout)):  # all points of one level first: its part of the table stays in the cache
+def _encode(points, table, layout, features):  # type: ignore[no-untyped-def]
+    """Features (2 L, N): all points of one level first, whose part of the table stays in the cache."""
+    for level in range(len(layout)):
         resolution, first, entries = layout[level]
         _encode_level(points, table, resolution, first, entries, features[2 * level : 2 * level + 2])
-    hidden, outputs = np.empty(BLOCK, np.float32), np.empty((w1.shape[0], BLOCK), np.float32)
-    for start in range(0, len(points), BLOCK):
-        count = min(BLOCK, len(points) - start)
-        _network(features[:, start : start + count], w0, b0, w1, b1, hidden[:count], outputs)
-        for i in range(count):
-            for o in range(len(outputs)):
-                result[start + i, o] = outputs[o, i]
 
 
 @compiled
@@ -83,25 +81,3 @@ def _encode_level(points, table, resolution, first, entries, features):  # type:
             near = gy * (gx * corners[0, k] + fx * corners[1, k]) + fy * (gx * corners[2, k] + fx * corners[3, k])
             far = gy * (gx * corners[4, k] + fx * corners[5, k]) + fy * (gx * corners[6, k] + fx * corners[7, k])
             features[k, i] = gz * near + fz * far
-
-
-@compiled
-def _network(features, w0, b0, w1, b1, hidden, outputs):  # type: ignore[no-untyped-def]
-    """One hidden layer, on all points of a block at once: the inner loops are vectors.
-
-    features: (inputs, N), N up to BLOCK. w0, w1: (out, in). hidden: (N,) scratch. outputs: (5, BLOCK) result.
-    """
-    for o in range(len(w1)):
-        outputs[o] = b1[o]
-    for j in range(len(w0)):
-        hidden[:] = b0[j]
-        for i in range(w0.shape[1]):
-            weight = w0[j, i]
-            row = features[i]
-            for k in range(len(hidden)):
-                hidden[k] += weight * row[k]
-        for o in range(len(w1)):
-            weight = w1[o, j]
-            row = outputs[o]
-            for k in range(len(hidden)):
-                row[k] += weight * max(hidden[k], np.float32(0))

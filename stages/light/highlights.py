@@ -77,10 +77,10 @@ def put_back(
 def _show(n, wo, alphas, light, start, end, shown):  # type: ignore[no-untyped-def]
     f32 = np.float32
     direction, spread, flux = light
-    lobes, count = alphas.shape[1], len(spread)
-    sin2, cosine = np.empty(count, f32), np.empty(count, f32)
+    lobes, count, channels = alphas.shape[1], len(spread), shown.shape[2]
+    sin2, cosine, near = np.empty(count, f32), np.empty(count, f32), np.empty(count, np.int32)
     tan2, grazing, blur, window = np.empty(count, f32), np.empty(count, f32), np.empty(count, f32), np.empty(count, f32)
-    weights, radiance = np.empty(2 * lobes * count, f32), np.empty((count, shown.shape[2]), f32)
+    weight, total = np.empty((2, count), f32), np.empty((2, channels), f32)
     for p in range(start, end):
         ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
         nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
@@ -94,28 +94,32 @@ def _show(n, wo, alphas, light, start, end, shown):  # type: ignore[no-untyped-d
             sin2[k] = max(sin2[k], f32(0)) if cosine[k] > f32(1e-3) else f32(1)
         m = 0
         for k in range(count):
-            if sin2[k] < f32(CONE):
-                to_half = math.sqrt(f32(0.5) * (f32(1) + direction[0, k] * ox + direction[1, k] * oy + direction[2, k] * oz))
-                grazing[m] = max(f32(1) - to_half, f32(0)) ** 5
-                tan2[m] = (f32(1) - cosine[k] * cosine[k]) / (cosine[k] * cosine[k])
-                blur[m] = f32(0.25) * spread[k]  # half vectors spread half as far
-                window[m] = f32(0.25 / math.pi) / wo_z * (f32(1) - sin2[k] / f32(CONE)) ** 2
-                radiance[m] = flux[k]
-                sin2[m] = sin2[k]
-                m += 1
-        if m > 0:
-            weight = weights[: 2 * lobes * m].reshape((2 * lobes, m))
-            for a in range(lobes):
-                for i in range(m):
-                    a2 = alphas[p, a] * alphas[p, a] + blur[i]
-                    q = sin2[i] + a2 * (f32(1) - sin2[i])
-                    masking = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) + math.sqrt(f32(1) + a2 * tan2[i]))
-                    f = window[i] * a2 / (q * q * masking)
-                    weight[a, i] = (f32(1) - grazing[i]) * f
-                    weight[lobes + a, i] = grazing[i] * f
-            np.dot(weight, radiance[:m], shown[p])
-        else:
-            shown[p] = 0
+            near[m] = k
+            m += sin2[k] < f32(CONE)
+        for i in range(m):
+            k = near[i]
+            half2 = f32(0.5) * (f32(1) + direction[0, k] * ox + direction[1, k] * oy + direction[2, k] * oz)
+            away = max(f32(1) - math.sqrt(half2), f32(0))
+            grazing[i] = away * away * away * away * away
+            tan2[i] = (f32(1) - cosine[k] * cosine[k]) / (cosine[k] * cosine[k])
+            blur[i] = f32(0.25) * spread[k]  # half vectors spread half as far
+            inside = f32(1) - sin2[k] * f32(1 / CONE)
+            window[i] = f32(0.25 / math.pi) / wo_z * inside * inside
+            sin2[i] = sin2[k]
+        for a in range(lobes):
+            for i in range(m):
+                a2 = alphas[p, a] * alphas[p, a] + blur[i]
+                q = sin2[i] + a2 * (f32(1) - sin2[i])
+                masking = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) + math.sqrt(f32(1) + a2 * tan2[i]))
+                f = window[i] * a2 / (q * q * masking)
+                weight[0, i], weight[1, i] = (f32(1) - grazing[i]) * f, grazing[i] * f
+            total[:] = 0
+            for i in range(m):
+                k = near[i]
+                for c in range(channels):
+                    total[0, c] += weight[0, i] * flux[k, c]
+                    total[1, c] += weight[1, i] * flux[k, c]
+            shown[p, a], shown[p, lobes + a] = total[0], total[1]
 
 
 @fast
