@@ -356,7 +356,7 @@ def bounces_arrays(between: Between, subject: Subject, quality: Quality) -> dict
     """As `BOUNCES` has them."""
     cells, exchange = between.cells, between.exchange
     triangle, shown = represented(subject, cells.triangle, cells.barycentric)
-    arrays = {"weight": exchange.weight, "direct": exchange.direct, **exchange.ends.to_arrays()}
+    arrays = {"weight": exchange.weight, "angle": exchange.angle, "direct": exchange.direct, **exchange.ends.to_arrays()}
     arrays |= {"cell_point": shown[:, :3].copy(), "cell_normal": shown[:, 3:6].copy(), "cell_scale": shown[:, 6].copy()}
     arrays |= {"cell_label": subject.label[triangle], "cell_width": np.array(cells.width, np.float32)}
     return arrays | {"lobe_rays": GLTF.counts(quality.lobe).astype(np.int32)}

@@ -90,10 +90,11 @@ ENDS = {
 
 BOUNCES = Schema(
     "dreammat.bounces",
-    1,
+    2,
     {
-        **ENDS,  # of the sides' rays; P1 is S + 1
-        "weight": Field("f4", ("R",)),
+        **ENDS,  # of all rays of the sides; P1 is S + 1
+        "weight": Field("f4", ("R",)),  # share in what a side receives
+        "angle": Field("f4", ("R",)),  # solid angle, steradians
         "direct": Field("f4", ("S", "L", 3)),  # direct light of both sides of each cell, under each environment
         "cell_point": Field("f4", ("C", 3)),  # where the material of a cell is asked for, its normal, label and scale there
         "cell_normal": Field("f4", ("C", 3)),

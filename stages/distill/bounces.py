@@ -42,7 +42,7 @@ class Bounces:
         if len(ends.mirror) != sides or arrays["direct"].shape != expected:
             raise ArtifactError(f"{folder / FILE}: its cells and their sides do not fit; make the conditions again")
         lights = [read_environment(folder, name, files) for name in environments]
-        self._exchange = Exchange(arrays["direct"], ends, arrays["weight"], make_sky(lights))
+        self._exchange = Exchange(arrays["direct"], ends, arrays["weight"], arrays["angle"], make_sky(lights))
         self._skies = [make_sky([light]) for light in lights]
         self._counts = arrays["lobe_rays"].astype(np.int64)
         self.points, self.normals, scale = (torch.from_numpy(arrays[f"cell_{n}"]) for n in ("point", "normal", "scale"))
@@ -54,8 +54,9 @@ class Bounces:
     def solved(self, material: Tensor) -> list[OwnLight]:
         """The light of an object whose cells are of these materials (C, 5), under each environment."""
         own = self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count)
-        lights = zip(*(np.split(a, len(self._skies), 1) for a in (own.light, own.before, own.sent)), strict=True)
-        return [OwnLight(own.bounces, own.material, *map(np.ascontiguousarray, light)) for light in lights]
+        every = (own.light, own.before, own.sent, own.brought)
+        lights = zip(*(map(np.ascontiguousarray, np.split(a, len(self._skies), 1)) for a in every), strict=True)
+        return [OwnLight(own.bounces, own.material, *light, own.around, brought) for *light, brought in lights]
 
     def added(
         self, own: list[OwnLight], transport: Transport, place: tuple[int, int], rows: NDArray[np.int64], n: Tensor, wo: NDArray

@@ -18,9 +18,10 @@ from stages.core.parallel import compiled
 from stages.light.cells import Cells, part_of
 from stages.light.octahedral import direction_to_square
 from stages.light.scene import OFFSET, Scene
+from stages.light.transport_kernels import on_square
 
 OPEN, DARK = 65535, 65534
-"""In place of the number of a second side: the open, and another object."""
+"""In place of the number of a side: the open, and another object."""
 
 STEPS = 65535
 """Steps of a direction along each side of the octahedral square."""
@@ -28,7 +29,7 @@ STEPS = 65535
 
 @dataclass(frozen=True)
 class Ends:
-    """Ends of the R blocked rays of P points, point after point, a point's mirror ray last.
+    """Ends of R rays of P points, point after point, a point's mirror ray last: the blocked ones, or all where so asked.
 
     start: (P + 1,) where a point's rays begin. mirror: (P,) whether its last one is its mirror's. side, second, third: (R,)
     where a ray ends, where a mirror there looks, and where one there. towards, onward, beyond: (R, 2) direction of the ray, and
@@ -109,25 +110,25 @@ def _last(start: NDArray[np.int32], mirror: NDArray[np.bool_]) -> NDArray[np.boo
 def find_ends(
     scene: Scene, cells: Cells, points: int, point: NDArray, mirror: NDArray, origin: NDArray, direction: NDArray
 ) -> Ends:
-    """Follow some blocked rays, ordered by their points.
+    """Follow some rays, ordered by their points.
 
     Args:
         points: how many there are. point: (R,) number of each ray's, ascending. mirror: (R,) whether a ray is its point's
         mirror ray, the last one then. origin, direction: (R, 3).
     """
     side, start, onward = _mirrored(scene, cells, origin, direction)
+    first, beyond = onward, np.zeros_like(onward)
+    second, third = np.full((2, len(side)), OPEN, np.uint16)
     own = np.flatnonzero(side < DARK)
-    start, first = start[own], onward[own]
-    second, third = np.full((2, len(own)), OPEN, np.uint16)
-    second, start, onward = _mirrored(scene, cells, start, first)
-    again = np.flatnonzero(second < DARK)
-    third[again] = _mirrored(scene, cells, start[again], onward[again])[0]
-    count = np.bincount(point[own], minlength=points)
-    shown = np.zeros(len(count), np.bool_)
-    shown[point[own][mirror[own]]] = True
+    second[own], start, beyond[own] = _mirrored(scene, cells, start[own], first[own])
+    again = second[own] < DARK
+    third[own[again]] = _mirrored(scene, cells, start[again], beyond[own[again]])[0]
+    count = np.bincount(point, minlength=points)
+    shown = np.zeros(points, np.bool_)
+    shown[point[mirror]] = True
     begins = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-    directions = (on_steps(np.ascontiguousarray(d, np.float32)) for d in (direction[own], first, onward))
-    return Ends(begins, shown, side[own], second, third, *directions)
+    directions = (on_steps(np.ascontiguousarray(d, np.float32)) for d in (direction, first, beyond))
+    return Ends(begins, shown, side, second, third, *directions)
 
 
 def _mirrored(
@@ -150,6 +151,16 @@ def on_steps(directions):  # type: ignore[no-untyped-def]
     for i in range(len(directions)):
         u, v = direction_to_square(directions[i, 0], directions[i, 1], directions[i, 2])
         result[i, 0], result[i, 1] = round(u * STEPS), round(v * STEPS)
+    return result
+
+
+@compiled
+def from_steps(steps):  # type: ignore[no-untyped-def]
+    """The inverse of `on_steps`."""
+    result = np.empty((len(steps), 3), np.float32)
+    for i in range(len(steps)):
+        x, y, z = on_square(steps[i, 0] * np.float32(1 / STEPS), steps[i, 1] * np.float32(1 / STEPS))
+        result[i, 0], result[i, 1], result[i, 2] = x, y, z
     return result
 
 

@@ -1,6 +1,6 @@
 """Light between the sides of an object's cells: radiosity, for whatever material each side has.
 
-Each side knows its direct light under every environment, and where those of its rays end that are blocked. One bounce is one
+Each side knows its direct light under every environment, and where its rays end. One bounce is one
 sparse product, of all environments at once: light = direct + what the rays bring, each by its weight.
 """
 
@@ -14,10 +14,10 @@ from stages.core.brdf import sample_cosine
 from stages.core.frames import tangent_frame
 from stages.core.parallel import compiled
 from stages.light.cells import Cells
-from stages.light.ends import STEPS, Ends
+from stages.light.ends import DARK, STEPS, Ends, from_steps
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
-from stages.light.leaving import OwnLight, Sky, make_sky, received, reflectance
+from stages.light.leaving import Around, OwnLight, Sky, make_sky, open_sky, received, reflectance
 from stages.light.light_set import MAX_LIGHTS
 from stages.light.scene import Scene
 from stages.light.terms import Terms, between_cosines
@@ -35,13 +35,14 @@ SIDES = Terms(roughness=(1.0,), shares=(0.94, 0.06), stored=5, mirror=(1, 3), ju
 class Exchange:
     """What the S sides of an object's cells receive under L environments, before any material is known.
 
-    direct: (S, L, 3), direct light, 1 where all around is 1. ends: of the sides' rays. weight: (K,) share of each in all that
-    its side receives. sky: of the environments.
+    direct: (S, L, 3), direct light, 1 where all around is 1. ends: of all rays of the sides. weight: (R,) share of each in what
+    its side receives from the object. angle: (R,), of `Around`. sky: of the environments.
     """
 
     direct: NDArray[np.float32]
     ends: Ends
     weight: NDArray[np.float32]
+    angle: NDArray[np.float32]
     sky: Sky
 
     def solved(self, material: NDArray[np.float32], bounces: int) -> OwnLight:
@@ -49,11 +50,14 @@ class Exchange:
         point. Args: material: (S, 5) albedo, roughness, metallic."""
         direct = np.ascontiguousarray(self.direct.reshape(len(self.direct), -1))
         dark = np.zeros_like(direct)
-        own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark)
+        around = Around(self.ends.start, from_steps(self.ends.towards), self.angle)
+        shown = open_sky(self.ends, self.angle, self.sky)
+        own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, around, shown)
         reflected = np.tile(reflectance(material), direct.shape[1] // 3)
         for _ in range(bounces - 1):
-            light = direct + received(self.ends, self.weight, own, self.sky)
-            own = OwnLight(own.bounces + 1, own.material, light, own.light, reflected * own.before)
+            more, brought = received(self.ends, self.weight, own, self.sky)
+            light, before, sent = direct + more, own.light, reflected * own.before
+            own = OwnLight(own.bounces + 1, own.material, light, before, sent, around, shown + brought)
         return own
 
 
@@ -80,27 +84,28 @@ class Between:
 
 
 def make_exchange(scene: Scene, cells: Cells, environments: list[Environment], seed: int) -> Exchange:
-    """Trace what the sides of the cells receive directly, and where their blocked rays end.
+    """Trace what the sides of the cells receive directly, and where their rays end.
 
     Sides that nobody sees, as the inner ones of what is closed, are left dark: only those are traced that lie open or on which
     rays of others end.
     """
     points = cells.sides(scene)
     light = np.zeros((len(points.n), 3 * len(environments)), np.float32)
-    place, ends, weights = np.full(len(points.n), -1, np.int64), [], []
+    place, ends, weights, angles = np.full(len(points.n), -1, np.int64), [], [], []
     new = np.flatnonzero(open_sides(scene, points))
     while len(new):
         some = points[new]
-        light[new], found, weight = _traced(scene, some, cells, environments, seed)
+        light[new], found, weight, angle = _traced(scene, some, cells, environments, seed)
         place[new] = (place >= 0).sum() + np.arange(len(new))
         ends.append(found)
         weights.append(weight)
+        angles.append(angle)
         seen = np.zeros(1 << 16, np.bool_)
         seen[np.concatenate([found.side, found.second, found.third])] = True
         new = np.flatnonzero(seen[: len(place)] & (place < 0))
     together = Ends.cat([*ends, Ends.none(1)])  # the last one stands for all that are not traced
-    every = np.concatenate([*weights, np.zeros(0, np.float32)])
-    return Exchange(light.reshape(len(light), -1, 3), together[place], every[together.numbers(place)], make_sky(environments))
+    weight, angle = (np.concatenate([*parts, np.zeros(0, np.float32)])[together.numbers(place)] for parts in (weights, angles))
+    return Exchange(light.reshape(len(light), -1, 3), together[place], weight, angle, make_sky(environments))
 
 
 PROBES = 8
@@ -121,28 +126,28 @@ def open_sides(scene: Scene, points: GBuffer) -> NDArray[np.bool_]:
 
 def _traced(
     scene: Scene, points: GBuffer, cells: Cells, environments: list[Environment], seed: int
-) -> tuple[NDArray[np.float32], Ends, NDArray[np.float32]]:
-    """Direct light of some sides (P, 3 L), where their blocked rays end, and the weight of each of these."""
+) -> tuple[NDArray[np.float32], Ends, NDArray[np.float32], NDArray[np.float32]]:
+    """Direct light of some sides (P, 3 L), where their rays end, and the weight and solid angle of each of these."""
     direct, ends = [], Ends.none(0)
     for first in range(0, len(environments), MAX_LIGHTS):
         lights = cached_light_set(tuple(environments[first : first + MAX_LIGHTS]))
-        sums = trace(scene, points, lights, RAYS, seed, SIDES, cells=None if first else cells)
+        sums = trace(scene, points, lights, RAYS, seed, SIDES, cells=None if first else cells, every=True)
         direct.append(sums.mean[:, 0, : 3 * len(lights.environments)])
         ends = sums.ends or ends
     cosine = (points.n * points.wo).sum(-1).astype(np.float64)
     whole = between_cosines(albedo.diffuse_table()[:, None], cosine)  # what an even light gives
-    weight, counts = np.zeros(len(ends.side), np.float32), SIDES.counts(RAYS.lobe)
+    (weight, angle), counts = np.zeros((2, len(ends.side)), np.float32), SIDES.counts(RAYS.lobe)
     alphas = SIDES.alphas(np.arange(len(points.n)))
-    _shares(points.n, *tangent_frame(points.n), points.wo, ends.start, ends.mirror, ends.towards, alphas, counts, weight)
+    _shares(points.n, *tangent_frame(points.n), points.wo, ends.start, ends.mirror, ends.towards, alphas, counts, weight, angle)
     rows = np.repeat(np.arange(len(points.n)), np.diff(ends.start))
-    weight /= whole[rows, 0]
-    weight /= np.maximum(np.bincount(rows, weight, len(points.n)), 1)[rows]  # no side sees more than all around it
-    return np.concatenate(direct, 1) / whole, ends, weight
+    weight /= np.bincount(rows, weight, len(points.n))[rows]
+    weight[ends.side >= DARK] = 0
+    return np.concatenate(direct, 1) / whole, ends, weight, angle
 
 
 @compiled
-def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight):  # type: ignore[no-untyped-def]
-    """What each end weighs in its point's E; a mirror's weighs nothing."""
+def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight, angle):  # type: ignore[no-untyped-def]
+    """What each ray weighs in its point's E, and the solid angle that it stands for; 0 for a mirror's."""
     f32 = np.float32
     most = 1
     for p in range(len(n)):
@@ -161,4 +166,4 @@ def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight):  # typ
         scratch = (s5, sin2, cos2, tan2)
         weigh(n, t, b, wo, p, (dx, dy, dz), count, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
         for i in range(count):
-            weight[start[p] + i] = w[0, i]
+            weight[start[p] + i], angle[start[p] + i] = w[0, i], inverse[i]

@@ -1,8 +1,8 @@
 """What the sides of an object's cells send along rays, given their materials and what they receive.
 
-A side's matt part sends what it receives. Its gloss sends what a mirror there shows, the more so the smoother it is: the
-environment, blurred as the side is rough, or another side, of which the same is asked once more; the rougher it is, the more
-what the side receives takes that place. After two mirrors, a side sends alike to everywhere.
+A side's matt part sends what it receives. Its gloss, where it is rough, sends what the side's own rays bring, weighted by its
+lobe: the sky along those that end on nothing, and other sides. Where it is smooth, it sends what a mirror there shows: the sky,
+blurred a little, or another side, of which the same is asked once more. After two mirrors, a side sends alike to everywhere.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from stages.core import albedo
+from stages.core.albedo import MIN_COSINE
 from stages.core.knots import F0
 from stages.core.parallel import compiled, in_parallel, slices
 from stages.light.ends import DARK, OPEN, STEPS, Ends
@@ -29,10 +30,15 @@ SIZES = (512, 64, 64, 32, 32)
 ROWS = 64
 """Rows of the environment that is blurred."""
 
-SOFT = 0.5
-"""Roughness under which gloss is not taken where a wide lobe sees it: its few rays would sparkle."""
+SOFT = 0.36
+"""Least roughness of gloss that a wide lobe sees, and of a side's: their few rays would sparkle."""
+
+NARROW, WIDE = 0.2, 0.35
+"""Roughness up to which gloss of a side shows what its mirror's ray meets, and from which on what the side's own rays meet."""
 
 POINTS_PER_TASK = 1 << 11
+
+RAYS_PER_TASK = 1 << 16
 
 
 class Sky(NamedTuple):
@@ -43,10 +49,22 @@ class Sky(NamedTuple):
     first: NDArray[np.int64]
 
 
+class Around(NamedTuple):
+    """All around the sides of an object's cells, as their R rays meet it, side after side.
+
+    start: (S + 1,) where a side's rays begin. direction: (R, 3). angle: (R,), solid angle that each stands for, steradians.
+    """
+
+    start: NDArray[np.int32]
+    direction: NDArray[np.float32]
+    angle: NDArray[np.float32]
+
+
 class OwnLight(NamedTuple):
     """Sides of cells under L environments. bounces: that a path may have made. material: (S, 5) albedo, roughness, metallic.
 
     light, before: (S, 3 L), what they receive, and that with one bounce less. sent: (S, 3 L), what they send with two less.
+    around: their rays; brought: (R, 3 L), what each of these brings, with one bounce less.
     """
 
     bounces: int
@@ -54,6 +72,8 @@ class OwnLight(NamedTuple):
     light: NDArray[np.float32]
     before: NDArray[np.float32]
     sent: NDArray[np.float32]
+    around: Around
+    brought: NDArray[np.float32]
 
 
 def make_sky(environments: Sequence[Environment]) -> Sky:
@@ -91,16 +111,31 @@ def mirrored(ends: Ends, own: OwnLight, sky: Sky, part: slice, least: NDArray[np
     return result
 
 
-def received(ends: Ends, weight: NDArray[np.float32], own: OwnLight, sky: Sky) -> NDArray[np.float32]:
-    """What all rays of each of the points bring it, each of a weight: (P, 3 L). Args: weight: (R,)."""
+def received(
+    ends: Ends, weight: NDArray[np.float32], own: OwnLight, sky: Sky
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """What all rays of each of the points bring it, each of a weight: (P, 3 L), and what each ray brings, (R, 3 L)."""
     points = len(ends.mirror)
     result = np.zeros((points, own.light.shape[1]), np.float32)
+    brought = np.empty((len(weight), own.light.shape[1]), np.float32)
 
     def task(part: slice) -> None:
-        brought = arriving(ends, own, sky, part)
-        _weighted(ends.start[part.start : part.stop + 1], weight, brought, result[part])
+        rays = slice(ends.start[part.start], ends.start[part.stop])
+        brought[rays] = arriving(ends, own, sky, part)
+        _weighted(ends.start[part.start : part.stop + 1], weight, brought[rays], result[part])
 
     in_parallel(task, slices(points, POINTS_PER_TASK))
+    return result, brought
+
+
+def open_sky(ends: Ends, angle: NDArray[np.float32], sky: Sky) -> NDArray[np.float32]:
+    """What the rays of the sides bring that end on nothing: (R, 3 L), 0 of the others. Args: angle: (R,) of `Around`."""
+    result = np.zeros((len(angle), sky.texels.shape[1]), np.float32)
+
+    def task(part: slice) -> None:
+        _shown(ends.side[part], ends.towards[part], angle[part], sky, result[part])
+
+    in_parallel(task, slices(len(angle), RAYS_PER_TASK))
     return result
 
 
@@ -173,21 +208,28 @@ def _cosine(one, two):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
+def _whole(table, x, roughness):  # type: ignore[no-untyped-def]
+    """What a rough mirror shows of an even light: sums A and B of `core.albedo`. Args: x: root of the cosine, in steps."""
+    row = roughness * np.float32(len(table) - 1)
+    low = min(int(row), len(table) - 2)
+    within = row - np.float32(low)
+    a = _between(table[low, :, 0], x) * (np.float32(1) - within) + _between(table[low + 1, :, 0], x) * within
+    b = _between(table[low, :, 1], x) * (np.float32(1) - within) + _between(table[low + 1, :, 1], x) * within
+    return a, b
+
+
+@compiled(inline="always")
 def _send(material, cosine, light, tables, out):  # type: ignore[no-untyped-def]
-    """What a side sends where its mirror shows `out`, which is overwritten. Args: light: (3 L,), what it receives."""
+    """What a side sends where its gloss shows `out`, which is overwritten. Args: light: (3 L,), what it receives."""
     f32 = np.float32
     table, diffuse = tables
     r, m = material[3], material[4]
     x = np.sqrt(cosine) * f32(len(diffuse) - 1)
-    row = r * f32(len(table) - 1)
-    low = min(int(row), len(table) - 2)
-    within = row - f32(low)
-    a = _between(table[low, :, 0], x) * (f32(1) - within) + _between(table[low + 1, :, 0], x) * within
-    b = _between(table[low, :, 1], x) * (f32(1) - within) + _between(table[low + 1, :, 1], x) * within
-    matt, wide = _between(diffuse, x) * (f32(1) - m), r * r
+    a, b = _whole(table, x, r)
+    matt = _between(diffuse, x) * (f32(1) - m)
     for c in range(len(out)):
         gloss = (f32(F0) * (f32(1) - m) + m * material[c % 3]) * a + b
-        out[c] = matt * material[c % 3] * light[c] + gloss * (out[c] + wide * (light[c] - out[c]))
+        out[c] = matt * material[c % 3] * light[c] + gloss * out[c]
 
 
 @compiled(inline="always")
@@ -198,10 +240,44 @@ def _rougher(roughness, other):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _along(ray, rays, lobe, least, own, sky, tables, shown):  # type: ignore[no-untyped-def]
-    """What comes along a ray, seen by a lobe of a roughness, written to `shown`. Args: least: roughness taken at least."""
-    side, second, third, towards, onward, beyond = rays
-    rough = _rougher(max(own.material[side[ray], 3], least), lobe)
+def _around(side, one, two, roughness, own, out):  # type: ignore[no-untyped-def]
+    """What a side's own rays show to its gloss, their mean by the lobe, written to `out`. Returns: whether there are any.
+
+    Args: one, two: of `Ends`, the direction of a ray and that of its mirror image.
+    """
+    f32 = np.float32
+    start, direction, angle = own.around
+    dx, dy, dz = on_square(one[0] * f32(1 / STEPS), one[1] * f32(1 / STEPS))
+    nx, ny, nz = on_square(two[0] * f32(1 / STEPS), two[1] * f32(1 / STEPS))
+    nx, ny, nz = nx - dx, ny - dy, nz - dz
+    length = max(np.sqrt(nx * nx + ny * ny + nz * nz), f32(1e-6))
+    nx, ny, nz = nx / length, ny / length, nz / length
+    n_o = max(length * f32(0.5), f32(MIN_COSINE))
+    a2 = roughness**4
+    masking = f32(0.5) + f32(0.5) * np.sqrt(f32(1) + a2 * (f32(1) - n_o * n_o) / (n_o * n_o))
+    out[:] = 0
+    total = f32(0)
+    for i in range(start[side], start[side + 1]):
+        n_i = nx * direction[i, 0] + ny * direction[i, 1] + nz * direction[i, 2]
+        if n_i <= f32(MIN_COSINE) or angle[i] == f32(0):
+            continue
+        hx, hy, hz = direction[i, 0] - dx, direction[i, 1] - dy, direction[i, 2] - dz
+        cos2 = min((n_i + n_o) * (n_i + n_o) / max(hx * hx + hy * hy + hz * hz, f32(1e-9)), f32(1))
+        q = f32(1) - cos2 + a2 * cos2
+        slope = f32(0.5) * np.sqrt(f32(1) + a2 * (f32(1) - n_i * n_i) / (n_i * n_i))
+        weight = angle[i] / (q * q * (masking + slope - f32(0.5)))
+        total += weight
+        for c in range(len(out)):
+            out[c] += weight * own.brought[i, c]
+    if total > f32(0):
+        out /= total
+    return total > f32(0)
+
+
+@compiled(inline="always")
+def _mirror_there(ray, rays, rough, own, sky, tables, shown):  # type: ignore[no-untyped-def]
+    """What a smooth side shows at the end of a ray: the sky along its mirror, or another side, of which the same is asked."""
+    _, second, third, _, onward, beyond = rays
     if second[ray] == OPEN:
         _look_up(sky, onward[ray], rough, shown)
     elif second[ray] == DARK or own.bounces < 2:
@@ -215,20 +291,51 @@ def _along(ray, rays, lobe, least, own, sky, tables, shown):  # type: ignore[no-
         else:
             shown[:] = own.sent[third[ray]]
         _send(own.material[there], _cosine(onward[ray], beyond[ray]), own.before[there], tables, shown)
-    _send(own.material[side[ray]], _cosine(towards[ray], onward[ray]), own.light[side[ray]], tables, shown)
+
+
+@compiled
+def _along(ray, rays, lobe, least, own, sky, tables, scratch, shown):  # type: ignore[no-untyped-def]
+    """What comes along a ray, seen by a lobe of a roughness, written to `shown`. Args: least: roughness taken at least."""
+    f32 = np.float32
+    side, towards, onward = rays[0][ray], rays[3][ray], rays[4][ray]
+    if side >= DARK:
+        shown[:] = 0
+        return
+    rough = _rougher(max(own.material[side, 3], least), lobe)
+    wide = min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
+    if wide > f32(0) and not _around(side, towards, onward, rough, own, scratch):
+        wide = f32(0)
+    if wide < f32(1):
+        _mirror_there(ray, rays, rough, own, sky, tables, shown)
+        for c in range(len(shown)):
+            shown[c] += wide * (scratch[c] - shown[c])
+    else:
+        shown[:] = scratch
+    _send(own.material[side], _cosine(towards, onward), own.light[side], tables, shown)
 
 
 @compiled
 def _arriving(start, mirror, rays, own, sky, tables, out):  # type: ignore[no-untyped-def]
     """`arriving`; start begins at the first of the rays that are wanted."""
+    scratch = np.zeros(out.shape[1], np.float32)
     for ray in range(start[0], start[-1]):
-        _along(ray, rays, np.float32(0), np.float32(SOFT), own, sky, tables, out[ray - start[0]])
+        _along(ray, rays, np.float32(0), np.float32(SOFT), own, sky, tables, scratch, out[ray - start[0]])
 
 
 @compiled
 def _mirrored(start, mirror, rays, least, own, sky, tables, out):  # type: ignore[no-untyped-def]
     """`mirrored`; start begins at the first of the points that are wanted."""
+    scratch = np.zeros(out.shape[2], np.float32)
     for p in range(len(mirror)):
         if mirror[p]:
             for k in range(least.shape[1]):
-                _along(start[p + 1] - 1, rays, least[p, k], np.float32(0), own, sky, tables, out[p, k])
+                _along(start[p + 1] - 1, rays, least[p, k], np.float32(0), own, sky, tables, scratch, out[p, k])
+
+
+@compiled
+def _shown(side, towards, angle, sky, out):  # type: ignore[no-untyped-def]
+    """`open_sky`."""
+    for i in range(len(side)):
+        if side[i] == OPEN:
+            width = np.sqrt(angle[i] * np.float32(0.25 / np.pi))  # half the radius of what the ray stands for
+            _look_up(sky, towards[i], min(np.sqrt(np.float32(0.5) * width), np.float32(1)), out[i])

@@ -270,11 +270,13 @@ def trace(
     terms: Terms = GLTF,
     wanted: NDArray[np.bool_] | None = None,
     cells: Cells | None = None,
+    every: bool = False,
 ) -> Sums:
     """The sums of every point by Monte Carlo, each on its own.
 
     Args:
         wanted: (P, lights), the rest is of no use; or all. cells: of the surface, where it is asked on which blocked rays end.
+        every: ask it of all rays.
     """
     count = len(points.n), len(lights.environments)
     wanted = np.ones(count, np.bool_) if wanted is None else wanted
@@ -284,7 +286,7 @@ def trace(
     with ThreadPoolExecutor(cores()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
         given, sums = (scene, points, lights, terms, rays), (mean, gap)
-        found = list(pool.map(lambda part: _tile(*given, pixel[part], part, wanted, sums, cells), parts))
+        found = list(pool.map(lambda part: _tile(*given, pixel[part], part, wanted, sums, (cells, every)), parts))
     if not wanted.all():
         gap[..., : 3 * count[1]] *= wanted.repeat(3, 1)[:, None]  # nor is its noise any to judge others by
     variance = reconstruction.variance(gap, reconstruction.Neighbours.of(points))
@@ -302,9 +304,9 @@ def _tile(
     part: NDArray,
     wanted: NDArray,
     sums: tuple[NDArray, NDArray],
-    among: Cells | None,
+    asked: tuple[Cells | None, bool],
 ) -> Ends | None:
-    """The sums of a tile's points, written to rows `part` of both `sums`, mean and gap. Returns: where its blocked rays end."""
+    """The sums of a tile's points, written to rows `part` of both `sums`, mean and gap. Returns: where its rays end."""
     mean, gap = sums
     n, wo, cells = points.n[part], points.wo[part], lights.cells
     frame, alphas = (n, *tangent_frame(n)), terms.alphas(part)
@@ -322,14 +324,15 @@ def _tile(
     weights = np.stack(terms.mirror_weights(cosine))
     for e, environment in enumerate(lights.environments):
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
-    return None if among is None else _ends(scene, among, rays, drawn, occluded)
+    among, every = asked
+    return None if among is None else _ends(scene, among, rays, drawn, occluded | every)
 
 
-def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", occluded: NDArray[np.bool_]) -> Ends:
-    """Where the blocked rays of a tile's lobes and mirrors end."""
+def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", asked: NDArray[np.bool_]) -> Ends:
+    """Where some of the rays of a tile's lobes and mirrors end."""
     slots = np.flatnonzero(rays.slots[:, 0] < len(rays.counts))  # the mirror's is the last one
     ray = drawn.row[:, slots]
-    point, slot = np.nonzero((ray >= 0) & occluded[ray])
+    point, slot = np.nonzero((ray >= 0) & asked[ray])
     ray = ray[point, slot]
     return find_ends(scene, cells, len(drawn.row), point, slot == len(slots) - 1, drawn.origin[ray], drawn.direction[ray])
 

@@ -44,6 +44,15 @@ def box_in_corner() -> Scene:
     return quads(*sides)
 
 
+def bowl() -> Scene:
+    """The lower half of a sphere, open above, of one sheet with smooth normals."""
+    import trimesh
+
+    mesh = trimesh.creation.icosphere(3, 0.5)
+    faces = mesh.faces[mesh.triangles_center[:, 2] < 0]
+    return Scene(mesh.vertices, faces, mesh.vertices[faces] / 0.5)
+
+
 def quads(*corners: NDArray) -> Scene:
     """Flat squares, (4, 3) each, which face where they wind counter-clockwise."""
     vertices = np.concatenate(corners)

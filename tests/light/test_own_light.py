@@ -81,6 +81,20 @@ def test_one_bounce_is_that_of_the_quadrature(values: tuple[float, ...], energy:
     assert found.mean() == pytest.approx(exact.mean(), rel=energy)
 
 
+@pytest.mark.parametrize(("roughness", "energy"), ((0.45, 0.02), (0.3, 0.04)))
+def test_a_metal_bowl_keeps_its_light(roughness: float, energy: float) -> None:
+    """Gold seen in gold, where the sky is bright above: of a lobe that the bowl half hides, the brighter half is left."""
+    scene, values = scenes.bowl(), (1.0, 0.77, 0.34, roughness, 1.0)
+    up = np.linspace(1, -1, 32)[:, None, None]
+    light = Environment("overhead", np.exp(1.2 * up).repeat(64, 1).repeat(3, 2).astype(np.float32))
+    points = scenes.view_of(scene, 24, (1.6, 1.0, 1.7))
+    pixels = np.flatnonzero(points.n[:, 2] > 0)[::37]
+    direct, found = (radiance[pixels] for radiance in shaded(scene, points, light, values, 1))
+    exact = reference_radiance(scene, points[pixels], light, 1, lambda p: everywhere(values).repeat(len(p.n), 0), 1)
+    assert len(pixels) > 5 and direct.mean() < 0.7 * exact.mean()
+    assert found.mean() == pytest.approx(exact.mean(), rel=energy)
+
+
 def test_a_mirror_shows_the_object_as_it_is() -> None:
     """Of the radiance that a mirror's ray brings from a matt red surface, the error is under 3 % of the light."""
     scene, points, light, cells, exchange, transport, ends = corner()
