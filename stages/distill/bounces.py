@@ -54,9 +54,9 @@ class Bounces:
     def solved(self, material: Tensor) -> list[OwnLight]:
         """The light of an object whose cells are of these materials (C, 5), under each environment."""
         own = self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count)
-        every = (own.light, own.before, own.sent, own.brought)
-        lights = zip(*(map(np.ascontiguousarray, np.split(a, len(self._skies), 1)) for a in every), strict=True)
-        return [OwnLight(own.bounces, own.material, *light, own.around, brought) for *light, brought in lights]
+        parts = (np.split(a, len(self._skies), 1) for a in (own.light, own.before, own.sent, own.brought))
+        lights = (map(np.ascontiguousarray, part) for part in zip(*parts, strict=True))
+        return [OwnLight(own.bounces, own.material, *(a, b, c, d), own.around) for a, b, c, d in lights]
 
     def added(
         self, own: list[OwnLight], transport: Transport, place: tuple[int, int], rows: NDArray[np.int64], n: Tensor, wo: NDArray

@@ -10,9 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.core.brdf import sample_cosine
+from stages.core.frames import tangent_frame
 from stages.core.parallel import compiled
 from stages.light.gbuffer import GBuffer, surface_points
-from stages.light.scene import Hits, Scene
+from stages.light.scene import OFFSET, Hits, Scene
+from stages.light.transport_kernels import GOLDEN
 
 CELLS = 6_000
 """Cells that the surface's area is divided into; detail adds to them."""
@@ -22,6 +25,15 @@ MOST = 12_000
 
 LONGEST = 4.0
 """A triangle longer than this many cells is cut, however narrow it is."""
+
+PROBES = 8
+"""Rays by which a point is found to lie open, or to be seen."""
+
+PLACES = np.array([[5, 5], [11, 2], [2, 11], [2, 2], [7, 7], [1, 7], [7, 1]]) / 15
+"""Points of a triangle, first and third barycentric coordinate: its middle, and more where that is not seen."""
+
+SEEN = 0.75
+"""Share of a point's rays that must show that it is seen from somewhere, for it to stand for its cell."""
 
 BOLDER = 1.25
 """Growth of the cells' width while there are too many."""
@@ -55,7 +67,7 @@ class Cells:
             gathered = _gathered(corners[whole].mean(1), scene.geometric_normal(np.flatnonzero(whole)), width)
             groups = int(gathered.max(initial=-1)) + 1
             if groups + int((cuts[~whole] ** 2).sum()) <= MOST:
-                return _numbered(cuts, gathered, groups, area, width)
+                return _numbered(scene, cuts, gathered, groups, area, width)
             width *= BOLDER
 
     def __len__(self) -> int:
@@ -80,34 +92,68 @@ def _gathered(centre: NDArray, normal: NDArray, width: float) -> NDArray[np.int6
     return group.reshape(-1)
 
 
-def _numbered(cuts: NDArray, gathered: NDArray, groups: int, area: NDArray, width: float) -> Cells:
-    """Cells of groups first, each stood for by its largest triangle, then those of cut triangles."""
+def probes(normal: NDArray) -> NDArray[np.float32]:
+    """Directions spread by the cosine: (PROBES, P, 3). Args: (P, 3)."""
+    t, b = tangent_frame(normal)
+    along = (sample_cosine((k + 0.5) / PROBES, (k * GOLDEN) % 1) for k in range(PROBES))
+    return np.stack([x * t + y * b + z * normal for x, y, z in along]).astype(np.float32)
+
+
+def _seen(scene: Scene, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float64]:
+    """Share of the rays of some points that end on nothing or on the front of a triangle, on their better side: (P,).
+
+    Within what is closed, as where one piece stands in another, all end on backs.
+    """
+    point, result = scene.point(triangle, barycentric), np.zeros(len(triangle))
+    for side in (1, -1):
+        normal = scene.geometric_normal(triangle) * np.float32(side)
+        along = probes(normal).reshape(-1, 3)
+        hits = scene.intersect(np.tile(point + np.float32(OFFSET) * normal, (PROBES, 1)), along)
+        shown = ~hits.mask | ((scene.geometric_normal(hits.triangle) * along).sum(-1) < 0)
+        result = np.maximum(result, shown.reshape(PROBES, -1).mean(0))
+    return result
+
+
+def _first_seen(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[NDArray, NDArray]:
+    """Of K points of each of C cells the first that is seen, or what is seen best: (C,), (C, 3). Args: (K, C), (K, C, 3)."""
+    best, seen = np.zeros(triangle.shape[1], np.int64), _seen(scene, triangle[0], barycentric[0])
+    for k in range(1, len(triangle)):
+        again = np.flatnonzero(seen < SEEN)
+        found = _seen(scene, triangle[k, again], barycentric[k, again])
+        better = found > seen[again]
+        best[again[better]], seen[again[better]] = k, found[better]
+    cell = np.arange(len(best))
+    return triangle[best, cell], barycentric[best, cell]
+
+
+def _numbered(scene: Scene, cuts: NDArray, gathered: NDArray, groups: int, area: NDArray, width: float) -> Cells:
+    """Cells of groups first, each stood for by its largest triangle that is seen, then those of cut triangles."""
     whole, cut = np.flatnonzero(cuts == 1), np.flatnonzero(cuts > 1)
     first = np.zeros(len(cuts), np.int64)
     first[whole] = gathered
     first[cut] = groups + np.cumsum(cuts[cut] ** 2) - cuts[cut] ** 2
     order = np.lexsort((whole, -area[whole], gathered))
-    largest = whole[order[np.unique(gathered[order], return_index=True)[1]]]
+    start = np.unique(gathered[order], return_index=True)[1]
+    count = np.diff(start, append=len(whole))
     parts = cut.repeat(cuts[cut] ** 2)
-    number = np.arange(len(parts)) - (first[parts] - groups)
-    triangle = np.concatenate([largest, parts]).astype(np.int32)
-    middle = np.full((groups, 3), 1 / 3, np.float32)
-    return Cells(
-        first.astype(np.int32),
-        cuts.astype(np.int32),
-        triangle,
-        np.concatenate([middle, _part_middles(number, cuts[parts])]).astype(np.float32),
-        width,
-    )
+    number = np.concatenate([np.zeros(groups, np.int64), np.arange(len(parts)) - (first[parts] - groups)])
+    along = np.concatenate([np.ones(groups, np.int64), cuts[parts]])
+    triangles, places = [], []
+    for k in range(len(PLACES)):
+        triangles.append(np.concatenate([whole[order[start + k % count]], parts]).astype(np.int32))
+        place = PLACES[np.concatenate([k // count, np.full(len(parts), k)])]
+        places.append(_part_points(number, along, place).astype(np.float32))
+    triangle, barycentric = _first_seen(scene, np.stack(triangles), np.stack(places))
+    return Cells(first.astype(np.int32), cuts.astype(np.int32), triangle, barycentric, width)
 
 
-def _part_middles(number: NDArray, cuts: NDArray) -> NDArray[np.float64]:
-    """Barycentric coordinates of the middle of a part of a triangle, as `part_of` numbers them."""
+def _part_points(number: NDArray, cuts: NDArray, place: NDArray) -> NDArray[np.float64]:
+    """Barycentric coordinates of points of triangles' parts, as `part_of` numbers them. Args: place: (P, 2), of PLACES."""
     row = np.floor(np.sqrt(number + 0.5)).astype(np.int64)  # row r holds 2 r + 1 parts, every second upside down
-    place = number - row * row
-    down = place % 2
-    b0 = (cuts - 1 - row + (1 + down) / 3) / cuts
-    b2 = (place // 2 + (1 + down) / 3) / cuts
+    column = number - row * row
+    place = np.where((column % 2 == 1)[:, None], 1 - place, place)
+    b0 = (cuts - 1 - row + place[:, 0]) / cuts
+    b2 = (column // 2 + place[:, 1]) / cuts
     return np.stack([b0, 1 - b0 - b2, b2], -1)
 
 

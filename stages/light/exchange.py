@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core import albedo
-from stages.core.brdf import sample_cosine
 from stages.core.frames import tangent_frame
 from stages.core.parallel import compiled
-from stages.light.cells import Cells
+from stages.light.cells import Cells, probes
 from stages.light.ends import DARK, STEPS, Ends, from_steps
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
@@ -22,7 +21,7 @@ from stages.light.light_set import MAX_LIGHTS
 from stages.light.scene import Scene
 from stages.light.terms import Terms, between_cosines
 from stages.light.transport import Quality, cached_light_set, trace
-from stages.light.transport_kernels import GOLDEN, on_square, weigh
+from stages.light.transport_kernels import on_square, weigh
 
 RAYS = Quality(64, 24, extra=False, smooth=False)
 """Rays of a side of a cell."""
@@ -52,12 +51,12 @@ class Exchange:
         dark = np.zeros_like(direct)
         around = Around(self.ends.start, from_steps(self.ends.towards), self.angle)
         shown = open_sky(self.ends, self.angle, self.sky)
-        own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, around, shown)
+        own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, shown, around)
         reflected = np.tile(reflectance(material), direct.shape[1] // 3)
         for _ in range(bounces - 1):
             more, brought = received(self.ends, self.weight, own, self.sky)
             light, before, sent = direct + more, own.light, reflected * own.before
-            own = OwnLight(own.bounces + 1, own.material, light, before, sent, around, shown + brought)
+            own = OwnLight(own.bounces + 1, own.material, light, before, sent, shown + brought, around)
         return own
 
 
@@ -108,19 +107,12 @@ def make_exchange(scene: Scene, cells: Cells, environments: list[Environment], s
     return Exchange(light.reshape(len(light), -1, 3), together[place], weight, angle, make_sky(environments))
 
 
-PROBES = 8
-"""Rays by which a side is found to lie open."""
-
-
 def open_sides(scene: Scene, points: GBuffer) -> NDArray[np.bool_]:
     """Of which sides a few rays, spread by the cosine, meet nothing."""
-    t, b = tangent_frame(points.n)
     found = np.zeros(len(points.n), np.bool_)
-    for k in range(PROBES):
-        x, y, z = sample_cosine((k + 0.5) / PROBES, (k * GOLDEN) % 1)
+    for along in probes(points.n):
         left = np.flatnonzero(~found)
-        along = (x * t + y * b + z * points.n)[left]
-        found[left] = ~scene.occluded(points.surface(left), along)
+        found[left] = ~scene.occluded(points.surface(left), along[left])
     return found
 
 

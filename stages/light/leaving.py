@@ -64,7 +64,7 @@ class OwnLight(NamedTuple):
     """Sides of cells under L environments. bounces: that a path may have made. material: (S, 5) albedo, roughness, metallic.
 
     light, before: (S, 3 L), what they receive, and that with one bounce less. sent: (S, 3 L), what they send with two less.
-    around: their rays; brought: (R, 3 L), what each of these brings, with one bounce less.
+    brought: (R, 3 L), what each of their rays brings, with one bounce less. around: those rays.
     """
 
     bounces: int
@@ -72,8 +72,8 @@ class OwnLight(NamedTuple):
     light: NDArray[np.float32]
     before: NDArray[np.float32]
     sent: NDArray[np.float32]
-    around: Around
     brought: NDArray[np.float32]
+    around: Around
 
 
 def make_sky(environments: Sequence[Environment]) -> Sky:

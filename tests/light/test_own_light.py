@@ -226,6 +226,17 @@ def test_every_point_lies_in_its_cell() -> None:
         assert own == list(range(len(cells))) and len(cells) <= MOST
 
 
+def test_a_cell_half_within_another_piece_is_stood_for_by_what_is_seen() -> None:
+    """A floor through a cube: no cell that reaches out of the cube by a third of itself is stood for by a point within."""
+    cube = [scenes.square(axis, at, -0.23, 0.23)[:: (-1 if at < 0 else 1)] for axis in range(3) for at in (-0.23, 0.23)]
+    scene = scenes.quads(scenes.square(2, 0.0, -0.5, 0.5), *cube)
+    cells = Cells.of(scene, 100)
+    point, flat = scene.point(cells.triangle, cells.barycentric), cells.triangle < 2
+    within = flat & (np.abs(point[:, :2]).max(1) < 0.23)
+    assert 0 < within.sum() < flat.sum() / 4
+    assert np.abs(point[within, :2]).max() < 0.23 - cells.width / 3
+
+
 def test_a_material_reflects_no_more_than_all() -> None:
     """White metal at most 1, white plaster what glTF's BRDF has: 1.04 where its gloss is a mirror."""
     rows = np.array([(1, 1, 1, r, m) for r in (0, 0.3, 0.6, 1) for m in (0, 1)], np.float32)
