@@ -118,6 +118,11 @@ def _grounded(phrases: list[Phrase]) -> list[Phrase]:
     return result
 
 
+def _hue_or_metal(phrase: Phrase) -> bool:
+    """Whether a phrase is a colour and nothing else, or a metal: "in black and gold"."""
+    return _hue_alone(phrase) or (phrase.metal and not (phrase.colors or phrase.region or phrase.thing))
+
+
 def _hue_alone(phrase: Phrase) -> bool:
     """Whether a phrase is a colour and nothing else: "ivory" is one, too."""
     named = phrase.substance in COLORS and not (phrase.colors or phrase.unknown or phrase.thing)
@@ -141,9 +146,9 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
         return [replace(first, substance=after.substance, region=None, where=""), *rest[1:]]  # "zebra striped, in cowhide"
     if first.color_only and after.animal and after.join.kind == "and":
         first.substance = _coat_of(after.animal)  # "pink and purple leopard print"
-    elif first.animal and any(map(is_hue, first.colors)) and after.color_only and after.join.kind == "and" and not after.region:
+    elif first.animal and any(map(is_hue, first.colors)) and _hue_or_metal(after) and after.join.kind == "and" and not after.region:
         ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), region=None, where="")
-        return [ground, replace(first, join=Join("with"), colors=after.colors), *rest[1:]]  # "zebra print in pink and black"
+        return [ground, replace(first, join=Join("with"), colors=after.colors or [after.substance]), *rest[1:]]  # "zebra print in pink and black"
     elif first.animal and after.color_only and after.join.kind == "with" and after.where in SHAPES:
         colors = first.colors or [ANIMALS[first.animal][0]]  # "a brown cow with white patches"
         ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), colors=colors)
@@ -151,16 +156,16 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
     if not first.animal or first.colors or first.substance or not rest or rest[0].region:
         return phrases
     coat = _coat_of(first.animal)
-    pair = len(rest) > 1 and rest[1].color_only and rest[1].join.kind == "and" and not rest[1].region
+    pair = len(rest) > 1 and _hue_or_metal(rest[1]) and rest[1].join.kind == "and" and not rest[1].region
     if rest[0].join.kind == "on" and rest[0].color_only and not pair:
         rest[0].substance = coat  # "leopard spots on tan"
     elif len(rest) > 1 and rest[0].color_only and rest[0].join.kind in ("comma", "on", "with") and not rest[1].region:
         one, other = rest[:2]
-        if other.join.kind not in ("and", "on") or not (other.color_only or other.join.kind == "on"):
+        if other.join.kind not in ("and", "on") or not (_hue_or_metal(other) or other.join.kind == "on"):
             return phrases
         ground, marks = (one, other) if other.join.kind == "and" else (other, one)
         ground = replace(ground, join=FIRST, substance=ground.substance or coat)
-        return [ground, replace(first, join=Join("with"), colors=marks.colors), *rest[2:]]
+        return [ground, replace(first, join=Join("with"), colors=marks.colors or [marks.substance]), *rest[2:]]
     return phrases
 
 

@@ -176,7 +176,7 @@ class Reading:
         if phrase.within and phrase.within.region:
             part = phrase.within.region.mask(phrase.within.where)
             whole = phrase.join.kind == "cover" and not gathering(phrase.substance)
-            masks = (part,) if whole else (part, mask)
+            masks = (part,) if whole and not (strands(phrase) or phrase.where in SHAPES) else (part, mask)
             return [Layer(coat, masks, LAYERED.get(coat.look, 0.0)), *self._weather(phrase, masks, beneath)]
         if phrase.join.kind == "fade":
             downwards = bool(phrase.region) and mask.kind == "below"
@@ -216,6 +216,8 @@ class Reading:
         if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):
             covers = phrase.join.kind in ("cover", "over")
             return gathers._replace(share=max(gathers.share, 0.65)) if covers and gathers.kind != "up" else gathers
+        if strands(phrase) and phrase.join.kind in ("cover", *BESIDE):
+            return SHAPES["bands"]._replace(share=0.5, size=0.06) if phrase.within else SHAPES["bands"]._replace(share=0.15)
         if phrase.substance and _family(phrase) == "gem" and phrase.join.kind in BESIDE and not phrase.part:
             return SHAPES["studs"]
         if phrase.substance in ROOFING and phrase.join.kind in ("", *BESIDE):
@@ -416,6 +418,11 @@ class Reading:
         return replace(coat, metres=self._metres or METRES.get(coat.look, 1.0))
 
 
+def strands(phrase: Phrase) -> bool:
+    """Whether a phrase is of something long and thin, which lies around a thing."""
+    return phrase.substance.split(" ")[-1] in ("ribbon", "ribbons", "cord", "cords", "rope", "ropes", "string", "twine", "strips")
+
+
 def _scaled(region: Region, much: float) -> Region:
     """A region that covers less or more than usual."""
     return region if much == 1 else region._replace(share=min(0.9, region.share * much))
@@ -460,7 +467,7 @@ def _greenish(phrase: Phrase) -> bool:
 
 
 OF_STUFF = {
-    "rubber": ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires"),
+    "rubber": ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires", "sidewall", "sidewalls"),
     "fabric": ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
                "sails", "tie", "bowtie", "necktie"),
     "glass": ("lens", "lenses", "window", "windows", "windshield", "windscreen", "panes", "pane", "liquid"),

@@ -144,7 +144,12 @@ SIMILES = (
     (r"\b(?:(?:in|with) )?(?:an? )?sunburst(?: finish)?\b", "glossy orange with dark brown edges"),
     (r"\bwith (?:the )?(?:word |words |text )?[\"']?[a-z]+[\"']? (?:stamped|stencill?ed|printed|written|embossed) "
      r"(?:on (?:it|the [a-z]+) )?in ([a-z]+)\b", r"with \1 lettering"),
-    (r"(?:,| with| and)(?: (?!thin|gold|silver|copper|brass)[a-z]+){0,2} (?:grout|mortar)(?: lines| joints)?\b(?! )", ""),
+    (r"(?:,| with| and)(?: (?!thin|gold|silver|copper|brass)[a-z]+){0,2} (?:grout|mortar)(?: lines| joints)?\b(?=$|[,.;]| and | with )", ""),
+    (r"\bwhite-?washed (?=brick|stone|rock)", "white "),
+    (r"\bwhite-?washed (?=[a-z])", "white painted "),
+    (r"\bcamouflage in ([a-z]+) (?:tones|colou?rs|shades)\b", r"\1 camouflage"),
+    (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ )?paint\b)", "peeling "),
+    (r"\bwith (?:an? |the )?(?:wooden |wood )?(?:plank|board|formwork) (?:imprints?|marks|texture|lines)\b", ""),
     (r"\bglowing (cracks|veins|fissures)\b", r"bright orange \1"),
     (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
     (r"\bblue and white (?=willow)", ""),
