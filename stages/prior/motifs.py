@@ -146,9 +146,10 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
         return [replace(first, substance=after.substance, region=None, where=""), *rest[1:]]  # "zebra striped, in cowhide"
     if first.color_only and after.animal and after.join.kind == "and":
         first.substance = _coat_of(after.animal)  # "pink and purple leopard print"
-    elif first.animal and any(map(is_hue, first.colors)) and _hue_or_metal(after) and after.join.kind == "and" and not after.region:
+    elif first.animal and any(map(is_hue, first.colors)) and after.join.kind == "and" and _hue_or_metal(after):
         ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), region=None, where="")
-        return [ground, replace(first, join=Join("with"), colors=after.colors or [after.substance]), *rest[1:]]  # "zebra print in pink and black"
+        marks = replace(first, join=Join("with"), colors=after.colors or [after.substance])
+        return [ground, marks, *rest[1:]]  # "zebra print in pink and black"
     elif first.animal and after.color_only and after.join.kind == "with" and after.where in SHAPES:
         colors = first.colors or [ANIMALS[first.animal][0]]  # "a brown cow with white patches"
         ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), colors=colors)

@@ -420,7 +420,10 @@ class Reading:
 
 def strands(phrase: Phrase) -> bool:
     """Whether a phrase is of something long and thin, which lies around a thing."""
-    return phrase.substance.split(" ")[-1] in ("ribbon", "ribbons", "cord", "cords", "rope", "ropes", "string", "twine", "strips")
+    return phrase.substance.split(" ")[-1] in STRANDS
+
+
+STRANDS = ("ribbon", "ribbons", "cord", "cords", "rope", "ropes", "string", "twine", "strips")
 
 
 def _scaled(region: Region, much: float) -> Region:

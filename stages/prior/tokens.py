@@ -144,7 +144,8 @@ SIMILES = (
     (r"\b(?:(?:in|with) )?(?:an? )?sunburst(?: finish)?\b", "glossy orange with dark brown edges"),
     (r"\bwith (?:the )?(?:word |words |text )?[\"']?[a-z]+[\"']? (?:stamped|stencill?ed|printed|written|embossed) "
      r"(?:on (?:it|the [a-z]+) )?in ([a-z]+)\b", r"with \1 lettering"),
-    (r"(?:,| with| and)(?: (?!thin|gold|silver|copper|brass)[a-z]+){0,2} (?:grout|mortar)(?: lines| joints)?\b(?=$|[,.;]| and | with )", ""),
+    (r"(?:,| with| and)(?: (?!thin|gold|silver|copper|brass)[a-z]+){0,2} (?:grout|mortar)(?: lines| joints)?\b"
+     r"(?=$|[,.;]| and | with )", ""),
     (r"\bwhite-?washed (?=brick|stone|rock)", "white "),
     (r"\bwhite-?washed (?=[a-z])", "white painted "),
     (r"\bcamouflage in ([a-z]+) (?:tones|colou?rs|shades)\b", r"\1 camouflage"),
