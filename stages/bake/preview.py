@@ -21,7 +21,7 @@ from stages.core.artifact import Artifact
 from stages.core.color import srgb_encode
 from stages.core.frames import camera_rays, tangent_frame
 from stages.core.images import labelled
-from stages.core.parallel import in_parallel
+from stages.core.parallel import compiled, in_parallel
 from stages.core.texture_sets import triangle_sets
 from stages.core.tiles import repeats
 from stages.light.environment import Environment
@@ -246,18 +246,41 @@ def footprint(scene: Scene, points: GBuffer, directions: NDArray, c2w: NDArray, 
 
 
 def edges(scene: Scene, triangle: NDArray, across: NDArray) -> NDArray[np.float32]:
-    """Vectors in the planes of triangles in barycentric coordinates. Args: (P,), (P, 2, 3). Returns: (P, 2, 3)."""
-    a, b, c = (scene.vertices[scene.triangles[triangle, k]].astype(np.float64) for k in range(3))
-    first, second = b - a, c - a
-    normal = np.cross(first, second)
-    squared = (normal**2).sum(1)
-    sound = squared > 0
+    """Vectors in the planes of triangles in barycentric coordinates, 0 where a triangle has no area.
+
+    Args: (P,), (P, 2, 3). Returns: (P, 2, 3)."""
     result = np.zeros(across.shape, np.float32)
-    for axis in (0, 1):
-        along = np.stack([np.cross(across[:, axis], second), np.cross(first, across[:, axis])], 1)  # (P, 2, 3)
-        weights = np.einsum("pkd,pd->pk", along, normal) / np.where(sound, squared, 1)[:, None] * sound[:, None]
-        result[:, axis] = np.c_[-weights.sum(1), weights]
+    _edges(scene.vertices, scene.triangles, triangle, np.asarray(across, np.float64), result)
     return result
+
+
+@compiled
+def _edges(vertices, triangles, triangle, across, result):  # type: ignore[no-untyped-def]
+    first, second, normal = np.empty(3), np.empty(3), np.empty(3)
+    for p in range(len(triangle)):
+        a, b, c = triangles[triangle[p]]
+        for d in range(3):
+            first[d] = np.float64(vertices[b, d]) - np.float64(vertices[a, d])
+            second[d] = np.float64(vertices[c, d]) - np.float64(vertices[a, d])
+        _cross(first, second, normal)
+        squared = normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2
+        if squared > 0:
+            for axis in range(across.shape[1]):
+                v = across[p, axis]
+                one, other = _volume(v, second, normal) / squared, _volume(first, v, normal) / squared
+                result[p, axis, 0], result[p, axis, 1], result[p, axis, 2] = -(one + other), one, other
+
+
+@compiled
+def _cross(a, b, result):  # type: ignore[no-untyped-def]
+    result[0], result[1], result[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@compiled
+def _volume(a, b, c):  # type: ignore[no-untyped-def]
+    """(a x b) · c."""
+    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    return x * c[0] + y * c[1] + z * c[2]
 
 
 def rougher(roughness: NDArray[np.float32], spread: NDArray[np.float32]) -> NDArray[np.float32]:

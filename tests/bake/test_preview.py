@@ -12,7 +12,7 @@ from scipy.ndimage import binary_erosion, uniform_filter
 from scipy.stats import norm
 
 from stages.bake import preview
-from stages.bake.preview import Look, draw_view, footprint, rougher
+from stages.bake.preview import Look, draw_view, edges, footprint, rougher
 from stages.bake.studio import EXPOSURE, FOV_Y, camera, cameras, write_studio
 from stages.core.artifact import load_npz
 from stages.core.color import luminance, srgb_encode
@@ -64,6 +64,20 @@ def test_a_footprint_is_what_the_next_ray_hits() -> None:
 def worn(scene: Scene, uv: NDArray, maps: NDArray) -> Look:
     """A mesh with one texture set."""
     return Look(scene, uv, [maps], np.zeros(len(uv), "i4"))
+
+
+def test_edges_lead_as_far_as_their_vectors() -> None:
+    """Of vectors in the planes of a ball's triangles; one without area leads nowhere."""
+    ball, rng = scenes.sphere(2), np.random.default_rng(0)
+    vertices = np.concatenate([ball.vertices, ball.vertices[:1]])
+    triangles = np.concatenate([ball.triangles, [[0, 1, len(ball.vertices)]]]).astype("i4")
+    scene = Scene(vertices, triangles, np.zeros((len(triangles), 3, 3), "f4"))
+    corners = vertices[triangles].astype(float)
+    u, v = rng.normal(size=(2, len(triangles), 2, 1))
+    across = u * (corners[:, 1] - corners[:, 0])[:, None] + v * (corners[:, 2] - corners[:, 0])[:, None]
+    found = edges(scene, np.arange(len(triangles)), across)
+    np.testing.assert_allclose(found[:-1], np.concatenate([-u - v, u, v], 2)[:-1], atol=1e-5)
+    assert (found[-1] == 0).all()
 
 
 def test_detail_of_one_texel_does_not_flicker() -> None:

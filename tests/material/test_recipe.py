@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from stages.material.directions import FIRST_ROUND, FLOOR, WHOLE, along, measure
+from stages.material.directions import FIRST_ROUND, FLOOR, WHOLE, Pieces, along, along_reference, measure
 from stages.material.evaluate import COLUMNS, evaluate
 from stages.material.masks import settled
 from stages.material.recipe import Coat, Layer, Mask, Recipe
@@ -119,6 +119,19 @@ def test_round_things_are_measured_around_and_boxes_by_their_sides() -> None:
     uv, face = along(pieces, row, box.point, box.normal)
     assert pieces.radius[0] == 0 and len(np.unique(face)) == 1
     np.testing.assert_allclose(np.ptp(uv, axis=1), [31 / 32, 31 / 32], atol=1e-5)
+
+
+def test_directions_are_those_of_their_plain_form() -> None:
+    """Of pieces that are round and others, each turned its own way."""
+    dice = np.random.default_rng(0)
+    point, normal = dice.normal(size=(2, 3000, 3)).astype(np.float32)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    turn = np.stack([[[np.cos(a), np.sin(a), 0], [-np.sin(a), np.cos(a), 0], [0, 0, 1]] for a in (0.0, 0.4, 1.1)])
+    centre, radius = dice.normal(size=(3, 3)).astype(np.float32), np.array([0, 0.3, 0], np.float32)
+    pieces, piece = Pieces(centre, turn.astype(np.float32), radius, centre), dice.integers(0, 3, 3000).astype(np.int32)
+    (uv, face), (wanted, own) = (of(pieces, piece, point, normal) for of in (along, along_reference))
+    np.testing.assert_array_equal(face, own)
+    np.testing.assert_allclose(uv, wanted, atol=2e-6)
 
 
 def test_bricks_close_around_a_tower() -> None:
