@@ -31,7 +31,7 @@ RARE = {
     "mango": "#ffa62b", "shamrock": "#01b44c", "heliotrope": "#d94ff5", "iris": "#6258c4", "pear": "#cbf85f",
     "sandy": "#f1da7a", "banana": "#ffff7e", "tomato": "#ef4026", "buff": "#fef69e", "fawn": "#cfaf7b",
     "chestnut": "#742802", "cherry": "#cf0234", "midnight": "#03012d", "rouge": "#ab1239", "wheat": "#fbdd7e",
-    "mulberry": "#920a4e", "celadon": "#befdb7", "strawberry": "#fb2943", "adobe": "#bd6c48", "camel": "#c69f59",
+    "mulberry": "#920a4e", "celadon": "#a8c4ac", "strawberry": "#fb2943", "adobe": "#bd6c48", "camel": "#c69f59",
     "coffee": "#a6814c", "ecru": "#feffca", "amber": "#feb308", "russet": "#a13905", "pistachio": "#c0fa8b",
     "bordeaux": "#7b002c", "ocean": "#017b92", "blush": "#f29e8e", "lemon": "#fdff52", "cerise": "#de0c62",
     "umber": "#b26400", "aubergine": "#3d0734", "emerald": "#01a049", "tangerine": "#ff9408", "pumpkin": "#e17701",

@@ -189,6 +189,8 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "studs around the rim"
     elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
         phrase.thing = text  # "striped cushion"
+    elif kind == "part" and phrase.region and phrase.region.kind == "badge" and token.value.kind in ("middle", "front"):
+        return  # "a brass boss in the middle"
     elif kind in ("part", "shape") and (phrase.region is None or kind == "part" or text in PAINTS):
         phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
     elif kind == "thing" and not phrase.closed:
@@ -242,7 +244,7 @@ def _name(phrase: Phrase, text: str) -> None:
     else:
         phrase.substance = text
         if family(old) != family(text) or text in PATTERNED:
-            phrase.colors = phrase.colors or [old]
+            phrase.colors = phrase.colors or ([] if phrase.animal else [old])
 
 
 COATS = frozenset(["skin", "hide", "scales", "feathers", "fur", "hair", "pelt", "shell", "flesh"])

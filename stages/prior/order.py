@@ -238,8 +238,8 @@ def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     places = PARTS_OF.get(name) or PARTS_OF.get(name.split(" ")[-1], {})
     for phrase in over:
         for part in (phrase, phrase.within):
-            if part and (part.where or part.part):
-                part.region = places.get((part.where or part.part).split(" ")[-1], part.region)
+            if part and (part.where or part.part or not part.region):
+                part.region = places.get((part.where or part.part or part.substance).split(" ")[-1], part.region)
     return first, over
 
 

@@ -82,7 +82,8 @@ PARTS_OF = _of_things(
      "shade": Region("above", 0.35)}),
     ("container, cargo container, shipping container, robot, mech, spaceship, locker, fridge, spacecraft, gas pump",
      dict.fromkeys(("panel", "panels"), PARTS["body"])),
-    ("armchair, sofa, couch, settee, ottoman, lounge chair", {"upholstery": PARTS["body"], "cushions": Region("up", 0.45)}),
+    ("armchair, sofa, couch, settee, ottoman, lounge chair", {"upholstery": PARTS["body"], "cushions": Region("up", 0.45),
+      "frame": Region("below", 0.25)}),
     ("house, cottage, stone cottage, building, villa, church, chapel, shop, cabin, hut, barn, townhouse",
      {"door": Region("badge", 0.25), "doors": Region("badge", 0.25)}),
     ("mushroom, toadstool, fly agaric, fly agaric mushroom, mushroom house, toadstool house",
@@ -92,6 +93,7 @@ PARTS_OF = _of_things(
      dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
     ("mug, cup, bottle, tumbler, flask", dict.fromkeys(("sleeve", "sleeves"), Region("middle", 0.5))),
     ("plate, saucer, platter, dish, tray, coin", {"rim": Region("edges", 0.15, 0.04)}),
+    ("lantern, street lamp, torch lamp", {"glass": Region("middle", 0.5), "handle": Region("above", 0.15)}),
     ("cannon, howitzer, carronade, mortar", dict.fromkeys(("carriage", "wheels"), Region("below", 0.45))),
     ("apple, red apple, green apple, pear, pumpkin, cherry, cherries, tomato, orange, lemon, peach, plum, strawberry, melon, "
      "pepper, pineapple", {**dict.fromkeys(("stem", "stalk"), Region("above", 0.08)),

@@ -152,6 +152,9 @@ SIMILES = (
     (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ )?paint\b)", "peeling "),
     (r"\bwith (?:an? |the )?(?:wooden |wood )?(?:plank|board|formwork) (?:imprints?|marks|texture|lines)\b", ""),
     (r"\bglowing (cracks|veins|fissures)\b", r"bright orange \1"),
+    (r"\b(?:gone|turned) green with (?:verdigris|patina|age)\b", "covered in verdigris"),
+    (r"\b(?:blue and white )?(?:delft|willow pattern|chinoiserie)(?:ware)?(?: blue)?(?: pottery| porcelain| china)? "
+     r"([a-z]+)\b", r"\1 in white glazed ceramic with cobalt blue motifs"),
     (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
     (r"\bblue and white (?=willow)", ""),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
