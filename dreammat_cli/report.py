@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from dreammat_cli.common import INPUT, Common, Guessing, common_options, defaults, examples, plan, reporter, show
+from stages.bake.options import SIZES
 from stages.report.options import (
     DistillReportOptions,
     OcclusionReportOptions,
@@ -14,11 +15,13 @@ from stages.report.options import (
     PriorReportOptions,
     ReportOptions,
     TransferReportOptions,
+    TransfersReportOptions,
     UnwrapReportOptions,
 )
 
 DEFAULT, PRIOR, DISTILL = defaults(ReportOptions), defaults(PriorReportOptions), defaults(DistillReportOptions)
 OCCLUSION, UNWRAP = defaults(OcclusionReportOptions), defaults(UnwrapReportOptions)
+TRANSFERS = defaults(TransfersReportOptions)
 
 
 @click.group(cls=Guessing)
@@ -111,16 +114,42 @@ def distill(conditions: Path, output: Path, common: Common, **chosen: Any) -> No
 
 @command.command(
     epilog=examples(
+        "dreammat report transfer models -o transfers",
         "dreammat report transfer chair/prep.npz chair/material.npz chair/asset --reference textured.glb",
     )
 )
-@click.argument("prep", type=INPUT, metavar="PREP.npz")
-@click.argument("material", type=INPUT, metavar="MATERIAL.npz")
-@click.argument("asset", type=INPUT, metavar="ASSET")
-@click.option("--reference", type=INPUT, required=True, metavar="MODEL.glb", help="The textured model of the same shape.")
+@click.argument("paths", type=INPUT, nargs=-1, required=True, metavar="FOLDER|PREP.npz MATERIAL.npz ASSET")
+@click.option("-o", "--output", type=INPUT, metavar="FOLDER", help="Of a folder of models: where all is written.")
+@click.option("--views", type=click.IntRange(1, 9999), default=TRANSFERS["views"], show_default=True, help="Of each model.")
+@click.option("--size", type=click.IntRange(16, 4096), default=TRANSFERS["size"], show_default=True, metavar="PIXELS",
+              help="Side of a view.")
+@click.option("--steps", type=click.IntRange(1), default=TRANSFERS["steps"], metavar="N",
+              help="Of every distillation.  [default: as `distill`]")
+@click.option("--texture", type=click.Choice(SIZES), default=TRANSFERS["texture"], show_default=True,
+              metavar="TEXELS", help="Side of the baked textures.")
+@click.option("--reference", type=INPUT, metavar="MODEL.glb", help="Of an asset: the textured model of the same shape.")
 @common_options
-def transfer(prep: Path, material: Path, asset: Path, common: Common, reference: Path) -> None:
-    """How exactly `distill --guidance reference` and `bake` brought the material of MODEL.glb over to the folder ASSET."""
+def transfer(
+    paths: tuple[Path, ...], output: Path | None, common: Common, reference: Path | None, **chosen: Any
+) -> None:
+    """How exactly `distill --guidance reference` and `bake` bring the material of textured models over.
+
+    For each .glb or .gltf in FOLDER all four stages are run, into the folder of -o: a table, and a picture of the truth beside
+    what was found. Stopped, the same command continues. Or for one asset that was made so, of the model of --reference.
+    """
+    if len(paths) == 1 and output and not reference:
+        options = TransfersReportOptions(**chosen)
+        if plan(common, "measure into", output, options):
+            return
+        from stages.report.transfers import report_transfers, summary
+
+        with reporter(common) as progress:
+            rows = report_transfers(paths[0], output, options, progress)
+        show(common, {"rows": [dataclasses.asdict(row) for row in rows]}, summary(rows))
+        return
+    if len(paths) != 3 or output or not reference:
+        raise click.UsageError("expected FOLDER with --output, or PREP.npz MATERIAL.npz ASSET with --reference")
+    prep, material, asset = paths
     if plan(common, "measure", asset, TransferReportOptions(reference)):
         return
     from stages.report.transfer import report_transfer

@@ -1,17 +1,19 @@
 """A small picture of a material on its object: a row per view, showing it shaded, its albedo, roughness and metallic."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import Tensor
 
 from stages.core.color import reinhard, srgb_encode
 from stages.core.images import write_png
-from stages.core.shading import shade
+from stages.core.shading import Material, shade
 from stages.distill.base import Base
-from stages.distill.views import Views
+from stages.distill.views import Surface, Views
 from stages.material.residual import Residual
 
 ROWS = 4
@@ -27,21 +29,30 @@ EXPOSURE = 1.5
 def write_preview(path: Path, views: Views, base: Base, residual: Residual) -> None:
     """Write the contact sheet as a PNG."""
     chosen = [views.seen[i * len(views.seen) // ROWS] for i in range(min(ROWS, len(views.seen)))]
-    rows = [_row(views, view, i % len(views.environments), base, residual) for i, view in enumerate(chosen)]
+    device = residual.table.device
+
+    def learnt(surface: Surface, width: Tensor) -> Material:
+        where = (surface.shown, surface.shown_normals, width, surface.label)
+        return base.material(residual, *(t.to(device) for t in where))
+
+    rows = [pictures(views, view, i % len(views.environments), learnt) for i, view in enumerate(chosen)]
     write_png(path, np.concatenate(rows, 0))
 
 
 @torch.no_grad()
-def _row(views: Views, view: int, environment: int, base: Base, residual: Residual) -> NDArray[np.float32]:
-    """Four pictures of one view side by side, (S, 4 S, 3), encoded for display."""
-    device = residual.table.device
+def pictures(
+    views: Views, view: int, environment: int, material_of: Callable[[Surface, Tensor], Material]
+) -> NDArray[np.float32]:
+    """Four pictures of one view side by side, (S, 4 S, 3), encoded for display.
+
+    Args: material_of: the material of surface points, whose pictures' pixels are so wide (P,).
+    """
     stride = math.ceil(max(views.width, views.height) / SIZE)
     row, column = np.divmod(views.pixels(view), views.width)
     shown = np.flatnonzero((row % stride == 0) & (column % stride == 0))
     surface = views.surface(view, shown)
-    transport = views.read_transport((view, environment))[torch.from_numpy(shown)].to(device, torch.float32)
-    where = (surface.shown, surface.shown_normals, stride * views.widths(view, surface), surface.label)
-    material = base.material(residual, *(t.to(device) for t in where))
+    material = material_of(surface, stride * views.widths(view, surface))
+    transport = views.read_transport((view, environment))[torch.from_numpy(shown)].to(material.albedo.device, torch.float32)
     scale = EXPOSURE / transport.E.mean().clamp(min=1e-6)
     pictures = (
         srgb_encode(reinhard(scale * shade(transport, material))),

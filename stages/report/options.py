@@ -71,6 +71,20 @@ class TransferReportOptions:
 
 
 @dataclass(frozen=True)
+class TransfersReportOptions:
+    """Options of the report on transfers of a folder of models."""
+
+    views: int = 40
+    """cameras of each model"""
+    size: int = 256
+    """pixels along each side of a view"""
+    steps: int | None = None
+    """of each distillation; None for the default"""
+    texture: int = 1024
+    """texels along each edge"""
+
+
+@dataclass(frozen=True)
 class PreviewReportOptions:
     """Options of the report on an asset's preview."""
 

@@ -11,7 +11,10 @@ from dreammat_cli.main import cli
 from stages.bake.options import BakeOptions
 from stages.bake.stage import bake
 from stages.core.errors import InputError
+from stages.core.images import read_image
+from stages.report.options import TransfersReportOptions
 from stages.report.transfer import report_transfer
+from stages.report.transfers import report_transfers
 from tests.bake.examples import constant, cube, save_material, save_prep
 
 LEFT, RIGHT = (0.5, 0.3, 0.1, 0.4, 0.1), (0.5, 0.3, 0.2, 0.6, 0.9)
@@ -48,3 +51,27 @@ def test_another_shape_is_refused(assets: Path, tmp_path: Path) -> None:
     model.export(tmp_path / "large.glb")
     with pytest.raises(InputError, match="nowhere near"):
         report_transfer(assets / "prep.npz", assets / "left.npz", assets / "left", tmp_path / "large.glb")
+
+
+def test_a_folder_of_models_gives_a_table_and_a_picture(assets: Path, tmp_path: Path) -> None:
+    models, out = tmp_path / "models", tmp_path / "out"
+    models.mkdir()
+    (models / "gold.glb").write_bytes((assets / "right" / "model.glb").read_bytes())
+    command = ["report", "transfer", str(models), "-o", str(out), "--json"]
+    command += ["--views", "3", "--size", "24", "--steps", "150", "--texture", "512"]
+    result = CliRunner().invoke(cli, command)
+    (row,) = json.loads(result.stdout)["rows"]
+    assert row["model"] == "gold" and row["exact"] and row["albedo_linear_db"] > 30
+    assert row["roughness_rmse"] < 0.05 and row["metallic_rmse"] < 0.08 and row["cpu_seconds"] > 0
+    assert (out / "transfer.csv").read_text().count("\n") == 2
+    picture = read_image(out / "transfer.png")
+    above, below = picture[:24], picture[24:]
+    assert picture.shape == (48, 96, 3) and float(abs(above - below).mean()) < 0.02 < float(picture.std())
+    made = (out / "gold" / "material.npz").stat().st_mtime_ns
+    again = CliRunner().invoke(cli, command)
+    assert json.loads(again.stdout)["rows"] == [row] and (out / "gold" / "material.npz").stat().st_mtime_ns == made
+
+
+def test_a_folder_without_models_is_named(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"holds no textured model; expected a folder of \.glb"):
+        report_transfers(tmp_path, tmp_path / "out", TransfersReportOptions())
