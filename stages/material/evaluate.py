@@ -12,7 +12,7 @@ from stages.core.color import srgb_decode
 from stages.material.directions import WHOLE, Pieces, along
 from stages.material.look import Look, from_oklab, to_oklab
 from stages.material.masks import coverage
-from stages.material.place import Place
+from stages.material.place import Place, columns
 from stages.material.recipe import Coat, Recipe
 from stages.material.substances import ALONG_GRAIN, LOOKS, METRES
 from stages.material.surface import Array, Surface
@@ -70,7 +70,8 @@ def _alone(recipe: Recipe, surface: Surface, pieces: Pieces) -> tuple[Array, Arr
     uv, face = along(pieces, surface.piece, surface.point, surface.normal)
     for rows, around in _groups(face, pieces):
         part = surface[rows]
-        world = Place(np.ascontiguousarray(part.point.T), uv[:, rows], face[rows], part.footprint, (around, 0, 0), recipe.seed)
+        p = np.ascontiguousarray(part.point.T)
+        world = Place(p, columns(uv, rows), face[rows], part.footprint, (around, 0, 0), recipe.seed)
         result[rows], shares[rows] = layered(recipe, part, world, pieces)
     return result, shares
 
@@ -136,7 +137,7 @@ def _solid(coat: Coat, surface: Surface, world: Place, pieces: Pieces, number: i
     frames = np.stack([_grain_frame(axis) for axis in pieces.grain])  # (K, 3, 3)
     own = dice.uniform(0, 0.3, (len(frames), 3)).astype(np.float32)[surface.piece]  # every piece is cut elsewhere
     local = np.einsum("pij,pj->pi", frames[surface.piece], surface.point - pieces.centre[surface.piece])
-    return (local + own).T.astype(np.float32)
+    return np.ascontiguousarray((local + own).T, np.float32)
 
 
 def _grain_frame(grain: Array) -> Array:

@@ -8,6 +8,11 @@ from numpy.typing import NDArray
 Axes = tuple[float, float, float]
 
 
+def columns(values: NDArray, rows: NDArray | slice) -> NDArray:
+    """Some columns of (K, P), each row of the result in one piece, which NumPy's own indexing does not give."""
+    return values[:, rows] if isinstance(rows, slice) else np.take(values, rows, 1)
+
+
 @dataclass(frozen=True)
 class Place:
     """Points at which a pattern is evaluated.
@@ -32,8 +37,9 @@ class Place:
         return self.p.shape[1]
 
     def __getitem__(self, rows: NDArray | slice) -> "Place":
-        p, uv, bend = self.p[:, rows], self.uv[:, rows], None if self.bend is None else self.bend[:, rows]
-        return replace(self, p=p, uv=uv, face=self.face[rows], footprint=self.footprint[rows], bend=bend)
+        bend = None if self.bend is None else columns(self.bend, rows)
+        p, uv, face, footprint = columns(self.p, rows), columns(self.uv, rows), self.face[rows], self.footprint[rows]
+        return replace(self, p=p, uv=uv, face=face, footprint=footprint, bend=bend)
 
     def straight(self, size: float) -> NDArray[np.float32]:
         """Where a structure of this size, metres, is looked up, (3, P): what is finer than a displacement follows it less and

@@ -115,6 +115,16 @@ def test_patterns_are_functions_of_the_place(name: str) -> None:
     np.testing.assert_array_equal(PATTERNS[name](at)[order], PATTERNS[name](at[order]))
 
 
+def test_some_points_of_a_place_lie_row_by_row_as_kernels_want_them() -> None:
+    """Coordinates with others between them take kernels up to twice the time."""
+    at = replace(square(1.0, 16), bend=np.ones((3, 256), np.float32))
+    for rows in (np.flatnonzero(np.arange(256) % 3), slice(5, 90)):
+        some = at[rows]
+        for values, whole in ((some.p, at.p), (some.uv, at.uv), (some.bend, at.bend)):
+            np.testing.assert_array_equal(values, whole[:, rows])
+            assert all(row.flags.c_contiguous for row in values)
+
+
 def test_cells_are_worley_s() -> None:
     """Distances fall to nothing at the points, borders to nothing between two; each cell has numbers of its own."""
     at = square(1.0, 300, 1e-4)
