@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from stages.core import albedo
 from stages.core.frames import tangent_frame
+from stages.core.lanes import LANES
 from stages.core.parallel import compiled
 from stages.light.cells import Cells, probes
 from stages.light.ends import DARK, STEPS, Ends, from_steps
@@ -21,7 +22,7 @@ from stages.light.light_set import MAX_LIGHTS
 from stages.light.scene import Scene
 from stages.light.terms import Terms, between_cosines
 from stages.light.transport import Quality, cached_light_set, trace
-from stages.light.transport_kernels import on_square, weigh
+from stages.light.transport_kernels import in_lanes, on_square, weigh
 
 RAYS = Quality(64, 24, extra=False, smooth=False)
 """Rays of a side of a cell."""
@@ -144,8 +145,8 @@ def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight, angle):
     most = 1
     for p in range(len(n)):
         most = max(most, start[p + 1] - start[p])
-    dx, dy, dz = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
-    s5, sin2, cos2, tan2 = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
+    most = in_lanes(most)
+    dx, dy, dz, scratch = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32), np.empty((6, LANES), f32)
     density, inverse, weights = np.empty(most, f32), np.empty(most, f32), np.empty(3 * most, f32)
     for p in range(len(n)):
         count = start[p + 1] - start[p]
@@ -154,8 +155,9 @@ def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight, angle):
         for i in range(count):
             ray = start[p] + i
             dx[i], dy[i], dz[i] = on_square(towards[ray, 0] * f32(1 / STEPS), towards[ray, 1] * f32(1 / STEPS))
-        w = weights[: 3 * count].reshape((3, count))
-        scratch = (s5, sin2, cos2, tan2)
-        weigh(n, t, b, wo, p, (dx, dy, dz), count, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
+        filled = in_lanes(count)
+        dx[count:filled], dy[count:filled], dz[count:filled] = n[p, 0], n[p, 1], n[p, 2]
+        w = weights[: 3 * filled].reshape((3, filled))
+        weigh(n, t, b, wo, p, (dx, dy, dz), filled, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
         for i in range(count):
             weight[start[p] + i], angle[start[p] + i] = w[0, i], inverse[i]

@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from stages.core.frames import tangent_frame
 from stages.core.knots import KNOTS
+from stages.core.lanes import LANES
 from stages.core.parallel import compiled, in_parallel, slices
 from stages.light.cells import Cells
 from stages.light.ends import STEPS, Ends
 from stages.light.leaving import POINTS_PER_TASK, OwnLight, Sky, arriving, mirrored
 from stages.light.terms import GLTF, Terms
-from stages.light.transport_kernels import on_square, weigh
+from stages.light.transport_kernels import in_lanes, on_square, weigh
 
 if TYPE_CHECKING:
     from stages.core.shading import Transport
@@ -100,8 +101,8 @@ def _gather(n, t, b, wo, rays, shown, counts, where, out, noise):  # type: ignor
     most = 1
     for p in range(points):
         most = max(most, start[p + 1] - start[p])
-    dx, dy, dz = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
-    s5, sin2, cos2, tan2 = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32), np.empty(most, f32)
+    most = in_lanes(most)
+    dx, dy, dz, scratch = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32), np.empty((6, LANES), f32)
     density, inverse, weight = np.empty(most, f32), np.empty(most, f32), np.empty(terms * most, f32)
     step = f32(1 / STEPS)
     for p in range(points):
@@ -111,9 +112,10 @@ def _gather(n, t, b, wo, rays, shown, counts, where, out, noise):  # type: ignor
         for i in range(lobes):
             dx[i], dy[i], dz[i] = on_square(towards[first + i, 0] * step, towards[first + i, 1] * step)
         if lobes:
-            w = weight[: terms * lobes].reshape((terms, lobes))
-            scratch = (s5, sin2, cos2, tan2)
-            weigh(n, t, b, wo, p, (dx, dy, dz), lobes, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
+            filled = in_lanes(lobes)
+            dx[lobes:filled], dy[lobes:filled], dz[lobes:filled] = n[p, 0], n[p, 1], n[p, 2]
+            w = weight[: terms * filled].reshape((terms, filled))
+            weigh(n, t, b, wo, p, (dx, dy, dz), filled, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
             for j in range(terms):
                 wide = f32(1) if j == 0 else _wideness(alphas[p, (j - 1) % knots])
                 if wide <= 0:

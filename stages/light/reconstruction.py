@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.core.lanes import LANES, fill, larger, load, smaller, store, sum_of, where_positive
 from stages.core.parallel import compiled, cores
 from stages.light.gbuffer import GBuffer
 
@@ -145,7 +146,8 @@ def _weighted(
     noisy = np.asarray((noise > 0).any((0, 2)))  # the others stay as they are
     own = np.array([k for k in np.flatnonzero(noisy) if k not in joint], np.int64)
     shared = np.array([k for k in joint if noisy[k]], np.int64)
-    mean, noise = np.ascontiguousarray(mean), np.ascontiguousarray(noise)
+    channels = mean.shape[2]
+    mean, noise = _whole_lanes(mean), _whole_lanes(noise)
     values, result = mean if power == 1 else noise, np.empty_like(mean)
     geometry = (near.index, near.pixel, near.n, near.point)
 
@@ -153,7 +155,13 @@ def _weighted(
         _average(mean, noise, values, power, own, shared, geometry, start, end, result)
 
     in_parts(part, len(mean), POINTS_PER_TASK)
-    return result
+    return result[:, :, :channels]
+
+
+def _whole_lanes(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(P, sums, LANES), what is missing being 0."""
+    missing = LANES - values.shape[2]
+    return np.ascontiguousarray(np.pad(values, ((0, 0), (0, 0), (0, missing))) if missing else values, np.float32)
 
 
 def _rows(values: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -233,28 +241,16 @@ def _same(n, point, p, q):  # type: ignore[no-untyped-def]
     return same * max(f32(0), f32(1) - out * out / (distance * f32(BEND)))
 
 
-@fast
-def _alike_together(mean, noise, p, q):  # type: ignore[no-untyped-def]
-    """How far noise explains the differences of the first sum at two points, taken together, 0 to 1."""
-    f32 = np.float32
-    excess, count = f32(0), f32(0)
-    for c in range(mean.shape[2]):
-        unlike = _unlike(mean[p, 0, c], noise[p, 0, c], mean[q, 0, c], noise[q, 0, c])
-        counts = f32(1) if noise[p, 0, c] > f32(0) else f32(0)
-        excess += counts * min(unlike, f32(1e9))
-        count += counts
-    return max(f32(0), f32(1) - excess / (f32(TOGETHER) * max(count, f32(1))))
-
-
 @inline
 def _unlike(mine, my_noise, other, other_noise):  # type: ignore[no-untyped-def]
-    """Squared difference of one value at two points, as a multiple of what noise explains."""
-    return (mine - other) * (mine - other) / (my_noise + min(my_noise, other_noise) + np.float32(1e-20))
+    """Squared differences of values at two points, as multiples of what noise explains."""
+    apart = mine - other
+    return apart * apart / (my_noise + smaller(my_noise, other_noise) + np.float32(1e-20))
 
 
 @fast
 def _average(mean, noise, values, power, own, shared, near, start, end, result):  # type: ignore[no-untyped-def]
-    """Sum of w^power values over the sum of w, to that power.
+    """Sum of w^power values over the sum of w, to that power. Args: mean, noise, values, result: (P, sums, LANES).
 
     own: numbers of the sums that have weights of their own, each channel one. shared: of those that share them channel by
     channel, by what they are unlike on average.
@@ -262,48 +258,59 @@ def _average(mean, noise, values, power, own, shared, near, start, end, result):
     f32 = np.float32
     index, pixel, n, point = near
     height, width = index.shape
-    sums, channels = mean.shape[1:]
-    total, weight = np.empty((sums, channels), np.float32), np.empty((sums, channels), np.float32)
-    unlike, w, whole = np.empty(channels, np.float32), np.empty(channels, np.float32), np.empty(channels, np.float32)
-    share = f32(1 / TOLERANCE) / f32(max(len(shared), 1))
+    size = mean.shape[1] * LANES
+    sums, weights = np.empty(size, np.float32), np.empty(size, np.float32)
+    none, one, share = fill(f32(0)), fill(f32(1)), f32(1 / TOLERANCE) / f32(max(len(shared), 1))
     for p in range(start, end):
         x, y = pixel[p]
-        total[:] = values[p]
-        weight[:] = 1
-        whole[:] = 1
+        me = p * size
+        for k in range(0, size, LANES):
+            store(sums, k, load(values, me + k))
+            store(weights, k, one)
+        whole = one
+        first, first_noise = load(mean, me), load(noise, me)
+        counts = where_positive(first_noise, one, none)
+        counts = counts * (f32(1 / TOGETHER) / max(sum_of(counts), f32(1)))
         for j in range(max(y - RADIUS, 0), min(y + RADIUS, height - 1) + 1):
             for i in range(max(x - RADIUS, 0), min(x + RADIUS, width - 1) + 1):
                 q = index[j, i]
                 if q < 0 or q == p:
                     continue
                 same = _same(n, point, p, q)
-                if same > f32(0):
-                    same *= _alike_together(mean, noise, p, q)
+                if same <= f32(0):
+                    continue
+                other = q * size
+                unlike = _unlike(first, first_noise, load(mean, other), load(noise, other))
+                same *= f32(1) - sum_of(smaller(unlike, fill(f32(1e9))) * counts)
                 if same <= f32(0):
                     continue
                 for s in own:
-                    for c in range(channels):
-                        u = _unlike(mean[p, s, c], noise[p, s, c], mean[q, s, c], noise[q, s, c])
-                        left = max(f32(0), f32(1) - u * f32(1 / TOLERANCE))
-                        v = same * left * left
-                        weight[s, c] += v
-                        total[s, c] += (v if power == 1 else v * v) * values[q, s, c]
+                    k = s * LANES
+                    unlike = _unlike(load(mean, me + k), load(noise, me + k), load(mean, other + k), load(noise, other + k))
+                    left = larger(f32(1) - unlike * f32(1 / TOLERANCE), none)
+                    w = left * left * same
+                    store(weights, k, load(weights, k) + w)
+                    if power != 1:
+                        w = w * w
+                    store(sums, k, load(sums, k) + w * load(values, other + k))
                 if len(shared) == 0:
                     continue
-                unlike[:] = 0
+                unlike = none
                 for s in shared:
-                    for c in range(channels):
-                        unlike[c] += _unlike(mean[p, s, c], noise[p, s, c], mean[q, s, c], noise[q, s, c])
-                for c in range(channels):
-                    left = max(f32(0), f32(1) - unlike[c] * share)
-                    v = same * left * left
-                    whole[c] += v
-                    w[c] = v if power == 1 else v * v
+                    k = s * LANES
+                    unlike = unlike + _unlike(
+                        load(mean, me + k), load(noise, me + k), load(mean, other + k), load(noise, other + k)
+                    )
+                left = larger(f32(1) - unlike * share, none)
+                w = left * left * same
+                whole = whole + w
+                if power != 1:
+                    w = w * w
                 for s in shared:
-                    for c in range(channels):
-                        total[s, c] += w[c] * values[q, s, c]
+                    k = s * LANES
+                    store(sums, k, load(sums, k) + w * load(values, other + k))
         for s in shared:
-            weight[s] = whole
-        for s in range(sums):
-            for c in range(channels):
-                result[p, s, c] = total[s, c] / (weight[s, c] if power == 1 else weight[s, c] * weight[s, c])
+            store(weights, s * LANES, whole)
+        for k in range(0, size, LANES):
+            weight = load(weights, k)
+            store(result, me + k, load(sums, k) / (weight if power == 1 else weight * weight))

@@ -60,7 +60,6 @@ from stages.light.transport_kernels import (
     hashed,
     interleaved_shifts,
     mirror,
-    settle,
     to_trace,
 )
 
@@ -428,11 +427,11 @@ class Rays:
         most = count * slots
         origins, directions = np.empty((2, most, 3), np.float32)
         texel, density = np.empty(most, np.int32), np.empty(most, np.float32)
-        rays = Drawn(origins, directions, texel, density, np.empty((count, slots), np.int32))
+        row = np.empty((slots, count), np.int32).T  # written slot by slot, and read by neighbours after each other
+        rays = Drawn(origins, directions, texel, density, row)
         excess = (lights.texels, lights.cells.begin, lights.cells.first)
         samples = (self.slots, self.shift, self.turn, self.jitter, self.seed)
-        used = draw(*frame, wo, start[0], pixel, samples, alphas, excess, chosen, rays)
-        settle(origins, directions, rays.row, *start[1:])
+        used = draw(*frame, wo, start, pixel, samples, alphas, excess, chosen, rays)
         return Drawn(origins[:used], directions[:used], texel[:used], density[:used], rays.row)
 
 

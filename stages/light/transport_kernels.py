@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.albedo import MIN_COSINE
+from stages.core.lanes import LANES, fill, floor, larger, load, root, smaller, store, where_positive
 from stages.core.parallel import compiled
 from stages.light.blender import F0, burley, fresnel
 from stages.light.environment import bilinear
@@ -25,9 +26,6 @@ GRAZING = 0.1
 """Cosine of a ray to its own triangle's normal from which on it starts from that triangle. Flatter ones start from the smooth
 surface that is meant, or facets would throw shadows on each other; were all to start there, the shadows of other things would
 move. Blender's default (Shadow Terminator: Geometry Offset)."""
-
-LANES = 16
-"""Rays are weighed in multiples of this many, so that a vector unit has no odd ones left over."""
 
 fast = compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
 inline = compiled(inline="always")
@@ -104,11 +102,12 @@ def aim(n, wo, wanted, alphas, cells, chosen, share):  # type: ignore[no-untyped
 
 
 @fast
-def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # type: ignore[no-untyped-def]
+def draw(n, t, b, wo, start, pixel, samples, alphas, excess, chosen, rays):  # type: ignore[no-untyped-def]
     """Draw a tile's rays above the horizon, those of neighbours along the same lobe after each other.
 
     Args:
-        n, t, b, wo, origin: (P, 3) world. pixel: (P, 2), its class and its number in the image.
+        n, t, b, wo: (P, 3) world. start: (P, 3) each, where rays leave the smooth surface and the triangle, and its normal.
+        pixel: (P, 2), its class and its number in the image.
         samples: slots, shift, turn, jitter and seed of `Rays`. alphas: (P, K) of the lobes after the cosine.
         excess: texels of a `LightSet`, begin and first of its cells. chosen: of `aim`. rays: arrays of a `Drawn`, written.
     Returns:
@@ -118,116 +117,164 @@ def draw(n, t, b, wo, origin, pixel, samples, alphas, excess, chosen, rays):  # 
     slots, shift, turn, spread, seed = samples
     origins, directions, texel, density, row = rays
     points, knots = len(n), alphas.shape[1]
-    lobes = knots + 1
-    view = np.empty((lobes, 3, points), np.float32)  # stretched by each alpha, see core.brdf.sample_vndf
-    jitter, base = np.empty(points, np.float32), np.empty(points, np.float32)
+    lobes, size = knots + 1, in_lanes(points)
+    axes, leaves, view = _planar((t, b, n), size), _planar(start, size), _views(t, b, n, wo, alphas, size)
+    jitter, base = np.zeros(size, np.float32), np.zeros(size, np.float32)
     for p in range(points):
-        x = wo[p, 0] * t[p, 0] + wo[p, 1] * t[p, 1] + wo[p, 2] * t[p, 2]
-        y = wo[p, 0] * b[p, 0] + wo[p, 1] * b[p, 1] + wo[p, 2] * b[p, 2]
-        z = wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2]
-        view[0, 0, p], view[0, 1, p], view[0, 2, p] = x, y, z
-        for k in range(knots):
-            a = alphas[p, k]
-            s = f32(1) / math.sqrt((x * x + y * y) * a * a + z * z)
-            view[k + 1, 0, p], view[k + 1, 1, p], view[k + 1, 2, p] = x * a * s, y * a * s, z * s
         jitter[p] = hashed(pixel[p, 1], seed) * spread
         base[p] = f32(shift[pixel[p, 0], 0]) + jitter[p]
     cell, within = _choose_cells(pixel, samples, excess, chosen, lobes, jitter)
-    us, vs, share = np.empty(points, np.float32), np.empty(points, np.float32), np.empty(points, np.float32)
-    cos, sin = np.empty(points, np.float32), np.empty(points, np.float32)
-    found, towards, up = np.empty(points, np.int32), np.empty((3, points), np.float32), np.empty(points, np.float32)
-    who, squared = np.empty(points, np.int32), np.empty((3, points), np.float32)  # the points that draw, and where they do
+    first, second = np.zeros(size, np.float32), np.zeros(size, np.float32)  # place on a square, or azimuth's cosine and sine
+    found, share, up = np.empty(size, np.int32), np.empty(size, np.float32), np.empty(size, np.float32)
+    towards, origin = np.empty(3 * size, np.float32), np.empty(3 * size, np.float32)
     used = 0
     for s in range(len(slots)):
         lobe, i, count, place = slots[s]
         offset0, offset1 = hashed(2 * lobe, seed), hashed(2 * lobe + 1, seed)
         if lobe >= lobes:
-            some = 0
+            up[:] = -1
+            some = False
             for p in range(points):
-                up[p] = f32(-1)
                 k = cell[p, place]
                 if k >= 0:
                     line = shift[pixel[p, 0], 1] + offset1 + (i + 1) * GOLDEN
-                    us[some], vs[some], found[p], share[p] = _in_cell(k, within[p, place], line - math.floor(line), excess)
+                    first[p], second[p], found[p], share[p] = _in_cell(k, within[p, place], line - math.floor(line), excess)
                     share[p] *= f32(count) * chosen[p, k] * f32(FINE * FINE / (4 * math.pi))
-                    who[some] = p
-                    some += 1
-            for j in range(some):
-                x, y, z = on_square(us[j], vs[j])
-                squared[0, j], squared[1, j], squared[2, j] = x, y, z
-            for j in range(some):
-                p = who[j]
-                x, y, z = squared[0, j], squared[1, j], squared[2, j]
-                towards[0, p], towards[1, p], towards[2, p] = x, y, z
-                up[p] = x * n[p, 0] + y * n[p, 1] + z * n[p, 2]
+                    up[p] = 1
+                    some = True
+            if some:
+                _along_squares(first, second, axes, towards, up)
         else:
+            some = True
             for p in range(points):
                 c = pixel[p, 0]
-                cos[p], sin[p] = turn[c, s, 0], turn[c, s, 1]
-            _towards(view, lobe, base, (f32(offset0), f32(i), f32(1 / max(count, 1))), cos, sin, alphas, towards, up)
-            for p in range(points):
-                x, y, z = towards[0, p], towards[1, p], up[p]
-                towards[0, p] = x * t[p, 0] + y * b[p, 0] + z * n[p, 0]
-                towards[1, p] = x * t[p, 1] + y * b[p, 1] + z * n[p, 1]
-                towards[2, p] = x * t[p, 2] + y * b[p, 2] + z * n[p, 2]
+                first[p], second[p] = turn[c, s, 0], turn[c, s, 1]
+            _towards(view, lobe, base, (f32(offset0), f32(i), f32(1 / max(count, 1))), first, second, axes, towards, up)
+        if some:
+            _settle(towards, leaves, origin)
         for p in range(points):
             row[p, s] = -1
             if up[p] > f32(0):
-                directions[used, 0], directions[used, 1], directions[used, 2] = towards[0, p], towards[1, p], towards[2, p]
-                origins[used, 0], origins[used, 1], origins[used, 2] = origin[p, 0], origin[p, 1], origin[p, 2]
+                for d in range(3):
+                    directions[used, d], origins[used, d] = towards[d * size + p], origin[d * size + p]
                 texel[used], density[used] = found[p], share[p]
                 row[p, s] = used
                 used += 1
     return used
 
 
-@fast
-def _towards(view, lobe, base, sample, cos, sin, alphas, towards, up):  # type: ignore[no-untyped-def]
-    """Where one sample of a lobe (-1: the mirror) points from each point, in its own frame.
+@inline
+def _planar(vectors, size):  # type: ignore[no-untyped-def]
+    """Three sets of vectors, (P, 3) each, as (9 size,): all first components of the first set, all second ones, ..."""
+    result = np.zeros(9 * size, np.float32)
+    for p in range(len(vectors[0])):
+        for d in range(3):
+            result[d * size + p] = vectors[0][p, d]
+            result[(3 + d) * size + p] = vectors[1][p, d]
+            result[(6 + d) * size + p] = vectors[2][p, d]
+    return result
 
-    view: of `draw`. base: (P,) shift of each point. sample: shift, number and inverse of the count. cos, sin: (P,) of its
-    azimuth. towards: its first two rows written, x and y. up: (P,), written, z.
+
+@inline
+def _views(t, b, n, wo, alphas, size):  # type: ignore[no-untyped-def]
+    """Directions to the viewer in the points' own frames, stretched by each alpha (`core.brdf.sample_vndf`), and the alphas.
+
+    Returns:
+        (1 + K, 4, size), the first as it is.
+    """
+    view = np.ones((1 + alphas.shape[1], 4, size), np.float32)
+    for p in range(len(n)):
+        x = wo[p, 0] * t[p, 0] + wo[p, 1] * t[p, 1] + wo[p, 2] * t[p, 2]
+        y = wo[p, 0] * b[p, 0] + wo[p, 1] * b[p, 1] + wo[p, 2] * b[p, 2]
+        z = wo[p, 0] * n[p, 0] + wo[p, 1] * n[p, 1] + wo[p, 2] * n[p, 2]
+        view[0, 0, p], view[0, 1, p], view[0, 2, p] = x, y, z
+        for k in range(alphas.shape[1]):
+            a = alphas[p, k]
+            s = np.float32(1) / math.sqrt((x * x + y * y) * a * a + z * z)
+            view[k + 1, 0, p], view[k + 1, 1, p], view[k + 1, 2, p], view[k + 1, 3, p] = x * a * s, y * a * s, z * s, a
+    return view
+
+
+@fast
+def _towards(view, lobe, base, sample, cos, sin, axes, towards, up):  # type: ignore[no-untyped-def]
+    """Where one sample of a lobe (-1: the mirror) points from each point.
+
+    view: of `_views`. base: (size,) shift of each point. sample: shift, number and inverse of the count. cos, sin: (size,) of
+    its azimuth. axes: of `_planar`. towards: (3 size,), written. up: (size,), written, the height over the surface.
+    """
+    offset, number, inverse = sample
+    size, none = len(up), fill(np.float32(0))
+    for p in range(0, size, LANES):
+        ox, oy, oz = load(view, p), load(view, size + p), load(view, 2 * size + p)
+        if lobe < 0:
+            x, y, z = none - ox, none - oy, oz
+        else:
+            first = load(base, p) + offset
+            u = (first - floor(first) + number) * inverse
+            x, y = load(cos, p), load(sin, p)
+            if lobe == 0:
+                radius = root(u)
+                x, y, z = x * radius, y * radius, root(larger(np.float32(1) - u, none))
+            else:
+                k = 4 * lobe * size + p
+                vx, vy, vz, a = load(view, k), load(view, k + size), load(view, k + 2 * size), load(view, k + 3 * size)
+                cap = (np.float32(1) - u) * (vz + np.float32(1)) - vz
+                radius = root(larger(np.float32(1) - cap * cap, none))
+                mx, my, mz = (x * radius + vx) * a, (y * radius + vy) * a, cap + vz
+                twice = (ox * mx + oy * my + oz * mz) / (mx * mx + my * my + mz * mz) * np.float32(2)
+                x, y, z = twice * mx - ox, twice * my - oy, twice * mz - oz
+        store(up, p, z)
+        for d in range(3):
+            k = d * size + p
+            store(towards, k, x * load(axes, k) + y * load(axes, k + 3 * size) + z * load(axes, k + 6 * size))
+
+
+@fast
+def _along_squares(us, vs, axes, towards, up):  # type: ignore[no-untyped-def]
+    """Directions of places on the octahedral square, as `on_square`; `up` stays as it is where it is not over 0.
+
+    us, vs, up: (size,). axes: of `_planar`. towards: (3 size,), written.
     """
     f32 = np.float32
-    offset, number, inverse = sample
-    ox, oy, oz = view[0, 0], view[0, 1], view[0, 2]
-    if lobe < 0:
-        for p in range(len(up)):
-            towards[0, p], towards[1, p], up[p] = -ox[p], -oy[p], oz[p]
-        return
-    vx, vy, vz = view[lobe, 0], view[lobe, 1], view[lobe, 2]
-    for p in range(len(up)):
-        first = base[p] + offset
-        u = (number + (first - np.floor(first))) * inverse
-        if lobe == 0:
-            radius = math.sqrt(u)
-            towards[0, p], towards[1, p] = radius * cos[p], radius * sin[p]
-            up[p] = math.sqrt(max(f32(1) - u, f32(0)))
-        else:
-            a = alphas[p, lobe - 1]
-            cap = (f32(1) - u) * (f32(1) + vz[p]) - vz[p]
-            radius = math.sqrt(max(f32(1) - cap * cap, f32(0)))
-            mx, my, mz = (radius * cos[p] + vx[p]) * a, (radius * sin[p] + vy[p]) * a, cap + vz[p]
-            twice = f32(2) * (ox[p] * mx + oy[p] * my + oz[p] * mz) / (mx * mx + my * my + mz * mz)
-            towards[0, p], towards[1, p], up[p] = twice * mx - ox[p], twice * my - oy[p], twice * mz - oz[p]
+    size, none, one = len(up), fill(f32(0)), fill(f32(1))
+    for p in range(0, size, LANES):
+        u, v = load(us, p) * f32(2) - one, load(vs, p) * f32(2) - one
+        a, b = larger(u, none - u), larger(v, none - v)
+        distance = one - (a + b)
+        radius = one - larger(distance, none - distance)
+        t = (b - a) / larger(radius, fill(f32(1e-20))) * f32(math.pi / 4)
+        q = t * t
+        cos = q * (q * (q * (q * f32(1 / 40320) - f32(1 / 720)) + f32(1 / 24)) - f32(1 / 2)) + one
+        sin = t * (q * (q * (q * (q * f32(1 / 362880) - f32(1 / 5040)) + f32(1 / 120)) - f32(1 / 6)) + one)
+        scale = radius * root(one - radius * radius * f32(0.5))
+        x, y, z = (cos - sin) * scale, (cos + sin) * scale, one - radius * radius
+        x, y = where_positive(none - u, none - x, x), where_positive(none - v, none - y, y)
+        z = where_positive(none - distance, none - z, z)
+        store(towards, p, x)
+        store(towards, size + p, y)
+        store(towards, 2 * size + p, z)
+        n = 6 * size + p
+        height = x * load(axes, n) + y * load(axes, n + size) + z * load(axes, n + 2 * size)
+        store(up, p, where_positive(load(up, p), height, none - one))
 
 
 @fast
-def settle(origin, direction, row, surface, ng):  # type: ignore[no-untyped-def]
-    """Move the starts of rays from the smooth surface to the triangle, by their angle to it, in place.
+def _settle(towards, leaves, origin):  # type: ignore[no-untyped-def]
+    """Starts of rays between the smooth surface and the triangle, by their angle to it.
 
-    Args:
-        origin, direction: (R, 3). row: (P, S) of a `Drawn`. surface, ng: (P, 3), where rays leave the triangle, and its normal.
+    towards: (3 size,). leaves: of `_planar`, smooth surface, triangle and its normal. origin: (3 size,), written.
     """
-    for p in range(len(row)):
-        for s in range(row.shape[1]):
-            r = row[p, s]
-            if r < 0:
-                continue
-            cosine = direction[r, 0] * ng[p, 0] + direction[r, 1] * ng[p, 1] + direction[r, 2] * ng[p, 2]
-            lifted = np.float32(1) - min(max(cosine * np.float32(1 / GRAZING), np.float32(0)), np.float32(1))
-            for d in range(3):
-                origin[r, d] = surface[p, d] + lifted * (origin[r, d] - surface[p, d])
+    f32 = np.float32
+    size = len(origin) // 3
+    for p in range(0, size, LANES):
+        n = 6 * size + p
+        cosine = load(towards, p) * load(leaves, n) + load(towards, size + p) * load(leaves, n + size)
+        cosine = cosine + load(towards, 2 * size + p) * load(leaves, n + 2 * size)
+        lifted = f32(1) - smaller(larger(cosine * f32(1 / GRAZING), fill(f32(0))), fill(f32(1)))
+        for d in range(3):
+            k = d * size + p
+            flat = load(leaves, k + 3 * size)
+            store(origin, k, flat + lifted * (load(leaves, k) - flat))
 
 
 @fast
@@ -318,18 +365,9 @@ def on_square(u, v):  # type: ignore[no-untyped-def]
 
 
 @inline
-def arctan_turns(y, x):  # type: ignore[no-untyped-def]
-    """atan2(y, x) 2 / pi for x, y >= 0, to 1e-5. Source: Abramowitz & Stegun 1964, 4.4.49."""
-    f32 = np.float32
-    large, small = max(x, y), min(x, y)
-    r = small / max(large, f32(1e-30))
-    q = r * r
-    a = f32(0.0208351)
-    a = a * q - f32(0.0851330)
-    a = a * q + f32(0.1801410)
-    a = a * q - f32(0.3302995)
-    a = (a * q + f32(0.9998660)) * r * f32(2 / math.pi)
-    return f32(1) - a if y > x else a
+def in_lanes(count):  # type: ignore[no-untyped-def]
+    """The least multiple of LANES that holds so many rays."""
+    return -(-count // LANES) * LANES
 
 
 @fast
@@ -339,15 +377,15 @@ def weigh(  # type: ignore[no-untyped-def]
     """How much of each sum a ray of point p stands for: the BRDF over the density of all lobe rays that could have been it.
 
     Args:
-        n, t, b, wo: (P, 3) world. wi: three components, (S,) each, of which the first `count` are read.
-        alphas: (P, K) of the glossy lobes. counts: rays of each lobe. principled: of `Terms`. scratch: four times (S,).
-        density: (S,), written: of the lobe rays, in rays per steradian. inverse: (S,), written: 1 / density.
+        n, t, b, wo: (P, 3) world. wi: three components, (S,) each, of which the first `count` are read, a multiple of LANES.
+        alphas: (P, K) of the glossy lobes, LANES at most. counts: rays of each lobe. principled: of `Terms`. scratch: (6,
+        LANES). density: (S,), written: of the lobe rays, in rays per steradian. inverse: (S,), written: 1 / density.
         weight: (sums, count), written.
     """
     f32 = np.float32
     dx, dy, dz = wi
-    s5, sin2, cos2, tan2 = scratch
     knots = alphas.shape[1]
+    alpha2, scale, share, masking, cosines, seen = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4], scratch[5]
     blender, departure, reflection = principled[0], f32(principled[1]), f32(principled[2])
     ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
     nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
@@ -355,50 +393,52 @@ def weigh(  # type: ignore[no-untyped-def]
     bx, by, bz = b[p, 0], b[p, 1], b[p, 2]
     wo_z = max(ox * nx + oy * ny + oz * nz, f32(MIN_COSINE * 0.5))
     tan2_o = (f32(1) - min(wo_z, f32(1)) ** 2) / (wo_z * wo_z)
-    for i in range(count):
-        wi_z = max(dx[i] * nx + dy[i] * ny + dz[i] * nz, f32(1e-7))
-        hx, hy, hz = dx[i] + ox, dy[i] + oy, dz[i] + oz
-        norm = f32(1) / math.sqrt(hx * hx + hy * hy + hz * hz)
-        hx, hy, hz = hx * norm, hy * norm, hz * norm
-        c = max(f32(1) - (hx * dx[i] + hy * dy[i] + hz * dz[i]), f32(0))
-        mx = hx * tx + hy * ty + hz * tz
-        my = hx * bx + hy * by + hz * bz
-        mz = hx * nx + hy * ny + hz * nz
-        s5[i] = c * c * c * c * c
-        sin2[i], cos2[i] = mx * mx + my * my, mz * mz
-        tan2[i] = (f32(1) - wi_z * wi_z) / (wi_z * wi_z)
-        density[i] = f32(counts[0]) * wi_z * f32(1 / math.pi)
-        weight[0, i] = f32(0.96) * (f32(1) - s5[i]) * wi_z * f32(1 / math.pi)
-    if blender:
-        for i in range(count):
-            wi_z = density[i] * f32(math.pi / counts[0])
-            cosine = f32(1) - s5[i] ** f32(0.2)
-            s5[i] = fresnel(cosine)
-            weight[0, i] = burley(wo_z, wi_z, cosine, f32(0), departure)
-            for k in range(knots):
-                weight[1 + k, i] = burley(wo_z, wi_z, cosine, f32(math.sqrt(alphas[p, k])), departure)
     for k in range(knots):
         a2 = alphas[p, k] * alphas[p, k]
         lambda_o = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) - f32(1))
-        scale = f32(0.25) * a2 / (f32(math.pi) * wo_z)
-        share = f32(counts[k + 1]) / (f32(1) + lambda_o)
-        masking = f32(0.5) + lambda_o
-        for i in range(count):
-            q = sin2[i] + a2 * cos2[i]
-            D = scale / (q * q)
-            f = D / (masking + f32(0.5) * math.sqrt(f32(1) + a2 * tan2[i]))
-            density[i] += share * D
+        alpha2[k], scale[k] = a2, f32(0.25) * a2 / (f32(math.pi) * wo_z)
+        share[k], masking[k] = f32(counts[k + 1]) / (f32(1) + lambda_o), f32(0.5) + lambda_o
+    for i in range(0, count, LANES):
+        x, y, z = load(dx, i), load(dy, i), load(dz, i)
+        wi_z = larger(x * nx + y * ny + z * nz, fill(f32(1e-7)))
+        hx, hy, hz = x + ox, y + oy, z + oz
+        norm = f32(1) / root(hx * hx + hy * hy + hz * hz)
+        hx, hy, hz = hx * norm, hy * norm, hz * norm
+        cosine = hx * x + hy * y + hz * z
+        c = larger(f32(1) - cosine, fill(f32(1e-6)))  # whose fifth power is no subnormal number
+        s5 = c * c * c * c * c
+        mx, my, mz = hx * tx + hy * ty + hz * tz, hx * bx + hy * by + hz * bz, hx * nx + hy * ny + hz * nz
+        sin2, cos2 = mx * mx + my * my, mz * mz
+        tan2 = (f32(1) - wi_z * wi_z) / (wi_z * wi_z)
+        rays = wi_z * (f32(counts[0]) * f32(1 / math.pi))
+        if blender:
+            store(cosines, 0, cosine)
+            store(seen, 0, wi_z)
+            for j in range(LANES):
+                weight[0, i + j] = burley(wo_z, seen[j], cosines[j], f32(0), departure)
+                for k in range(knots):
+                    weight[1 + k, i + j] = burley(wo_z, seen[j], cosines[j], f32(math.sqrt(alphas[p, k])), departure)
+                cosines[j] = fresnel(cosines[j])
+            s5 = load(cosines, 0)
+        else:
+            store(weight, i, (f32(1) - s5) * wi_z * f32(0.96 / math.pi))
+        for k in range(knots):
+            q = sin2 + cos2 * alpha2[k]
+            smith = root(tan2 * alpha2[k] + f32(1)) * f32(0.5) + masking[k]
+            f = scale[k] / (q * q * smith)
+            rays = rays + f * smith * share[k]
+            first, second = (1 + k) * count + i, (1 + knots + k) * count + i
             if blender:
-                weight[1 + k, i] += reflection * (f32(F0) + f32(1 - F0) * s5[i]) * f
-                weight[1 + knots + k, i] = f
+                store(weight, first, load(weight, first) + (s5 * f32(1 - F0) + f32(F0)) * f * reflection)
+                store(weight, second, f)
             else:
-                weight[1 + k, i] = (f32(1) - s5[i]) * f
-                weight[1 + knots + k, i] = s5[i] * f
-    for i in range(count):
-        inverse[i] = f32(1) / density[i]
-    for j in range(len(weight)):
-        for i in range(count):
-            weight[j, i] *= inverse[i]
+                store(weight, first, (f32(1) - s5) * f)
+                store(weight, second, s5 * f)
+        over = f32(1) / rays
+        store(density, i, rays)
+        store(inverse, i, over)
+        for j in range(len(weight)):
+            store(weight, j * count + i, load(weight, j * count + i) * over)
 
 
 @inline
@@ -437,88 +477,125 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, albedo, seen, where
     texels, level_start, fine, block, peak, light_density, cells, aimed = seen
     lights = len(cells)
     points, most = row.shape
-    most = -(-most // LANES) * LANES
-    terms, levels = albedo.shape[1], len(level_start)
+    most = in_lanes(most)
+    terms, levels, stored = albedo.shape[1], len(level_start), out.shape[1]
     dx, dy, dz = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
-    s5, sin2, cos2 = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
-    scratch = (s5, sin2, cos2, np.empty(most, np.float32))
+    scratch = np.empty((6, LANES), np.float32)
     density, inverse = np.empty(most, np.float32), np.empty(most, np.float32)
     bits = inverse.view(np.int32)
     us, vs, level = np.empty(most, np.float32), np.empty(most, np.float32), np.empty(most, np.int32)
     ray, light = np.empty(most, np.int32), np.empty(most, np.int32)
+    begin = np.zeros(5, np.int64)  # of the lobe rays of both halves, then of their light rays; and the end
     weights = np.empty(terms * most, np.float32)
-    radiance = np.empty((most, 2 * CHANNELS), np.float32)  # of the residual, then of the excess
-    total = np.empty((2, terms, 2 * CHANNELS), np.float32)
+    radiance = np.empty((most, CHANNELS), np.float32)
+    total = np.empty((4, terms, CHANNELS), np.float32)
     texel_angle = 4 * math.pi / (SQUARE * SQUARE)
     filtering = f32(0.25 / texel_angle) if len(albedo) > 0 else f32(0)
+    counted = np.zeros(CHANNELS, np.float32)
+    counted[WEIGHT] = 1
     for p in range(points):
-        for half in range(2):
-            m = lobes = 0
-            for is_light in range(2):
-                lobes = m
-                for s in range(bounds[2 * half + is_light], bounds[2 * half + is_light + 1]):
-                    r = row[p, s]
-                    if r >= 0 and not (is_light and occluded[r]):
-                        dx[m], dy[m], dz[m] = directions[r, 0], directions[r, 1], directions[r, 2]
-                        ray[m], light[m] = r, slots[s, 0] - len(counts)
-                        m += 1
-            count = -(-m // LANES) * LANES  # whole vectors: the rays that fill them up see nothing
-            dx[m:count], dy[m:count], dz[m:count] = n[p, 0], n[p, 1], n[p, 2]
-            weight = weights[: terms * count].reshape((terms, count))
-            weigh(n, t, b, wo, p, (dx, dy, dz), count, alphas, counts, principled, scratch, density, inverse, weight)
-            radiance[:count] = 0
-            radiance[:lobes, WEIGHT] = 1
-            for i in range(min(-(-lobes // LANES) * LANES, count)):  # where lobe rays look
-                a = math.sqrt(max(f32(1) - abs(dz[i]), f32(0)))
-                v = arctan_turns(abs(dy[i]), abs(dx[i])) * a
-                u = a - v
-                if dz[i] < 0:
-                    u, v = f32(1) - v, f32(1) - u
-                us[i] = (u if dx[i] >= 0 else -u) * f32(0.5) + f32(0.5)
-                vs[i] = (v if dy[i] >= 0 else -v) * f32(0.5) + f32(0.5)
-                inverse[i] = inverse[i] * filtering  # an eighth of 2 x, the nearest level: finer, for less bias
-                level[i] = min(max(((bits[i] >> 23) - 127) >> 1, 0), levels - 1)
-            for i in range(lobes):
-                if occluded[ray[i]]:
-                    continue
+        m = 0
+        for part in range(4):
+            is_light, half = part // 2, part % 2
+            for s in range(bounds[2 * half + is_light], bounds[2 * half + is_light + 1]):
+                r = row[p, s]
+                if r >= 0 and not (is_light and occluded[r]):
+                    dx[m], dy[m], dz[m] = directions[r, 0], directions[r, 1], directions[r, 2]
+                    ray[m], light[m] = r, slots[s, 0] - len(counts)
+                    m += 1
+            begin[part + 1] = m
+        lobes, count = begin[2], in_lanes(m)  # whole vectors: the rays that fill them up see nothing
+        dx[m:count], dy[m:count], dz[m:count] = n[p, 0], n[p, 1], n[p, 2]
+        weight = weights[: terms * count].reshape((terms, count))
+        weigh(n, t, b, wo, p, (dx, dy, dz), count, alphas, counts, principled, scratch, density, inverse, weight)
+        _on_square(dx, dy, dz, in_lanes(lobes), us, vs)
+        for i in range(lobes):  # an eighth of the solid angle; 2 x, the nearest level: finer, for less bias
+            inverse[i] *= filtering
+            level[i] = min(max(((bits[i] >> 23) - 127) >> 1, 0), levels - 1)
+        for i in range(lobes):
+            found = load(counted, 0)
+            if not occluded[ray[i]]:
                 size = SQUARE >> level[i]
                 x, y = us[i] * f32(size) + f32(0.5), vs[i] * f32(size) + f32(0.5)
                 left, top = int(x), int(y)
                 x, y = x - f32(left), y - f32(top)
-                above = level_start[level[i]] + top * (size + 2) + left
-                below = above + size + 2
-                w00, w01, w10, w11 = (f32(1) - x) * (f32(1) - y), x * (f32(1) - y), (f32(1) - x) * y, x * y
-                for c in range(WEIGHT):
-                    radiance[i, c] = (
-                        w00 * texels[above, c]
-                        + w01 * texels[above + 1, c]
-                        + w10 * texels[below, c]
-                        + w11 * texels[below + 1, c]
-                    )
-                column, line = min(int(us[i] * f32(FINE)), FINE - 1), min(int(vs[i] * f32(FINE)), FINE - 1)
-                number = block[line >> 1, column >> 1]
-                if number >= 0:
-                    texel = 4 * number + 2 * (line & 1) + (column & 1)
-                    for e in range(lights):
-                        cell = cells[e, line >> CELL_SHIFT, column >> CELL_SHIFT]
-                        if cell >= 0:
-                            share = density[i] / (density[i] + light_density[texel, e] * aimed[p, cell])
-                            for c in range(3 * e, 3 * e + 3):
-                                radiance[i, c] += share * fine[texel, c]
-            for i in range(lobes, m):
-                share = density[i] / (density[i] + drawn_density[ray[i]])
-                for c in range(3):
-                    radiance[i, CHANNELS + 3 * light[i] + c] = share * peak[drawn[ray[i]], c]
-            np.dot(weight, radiance[:count], total[half])
+                above = (level_start[level[i]] + top * (size + 2) + left) * CHANNELS
+                below = above + (size + 2) * CHANNELS
+                found = found + load(texels, above) * ((f32(1) - x) * (f32(1) - y))
+                found = found + load(texels, above + CHANNELS) * (x * (f32(1) - y))
+                found = found + load(texels, below) * ((f32(1) - x) * y)
+                found = found + load(texels, below + CHANNELS) * (x * y)
+            store(radiance, i * CHANNELS, found)
+        for i in range(lobes):
+            column, line = min(int(us[i] * f32(FINE)), FINE - 1), min(int(vs[i] * f32(FINE)), FINE - 1)
+            number = block[line >> 1, column >> 1]
+            if number >= 0 and not occluded[ray[i]]:
+                texel = 4 * number + 2 * (line & 1) + (column & 1)
+                for e in range(lights):
+                    cell = cells[e, line >> CELL_SHIFT, column >> CELL_SHIFT]
+                    if cell >= 0:
+                        share = density[i] / (density[i] + light_density[texel, e] * aimed[p, cell])
+                        for c in range(3 * e, 3 * e + 3):
+                            radiance[i, c] += share * fine[texel, c]
+        for i in range(lobes, m):
+            store(radiance, i * CHANNELS, fill(f32(0)))
+            share = density[i] / (density[i] + drawn_density[ray[i]])
+            for c in range(3):
+                radiance[i, 3 * light[i] + c] = share * peak[drawn[ray[i]], c]
+        for part in range(4):
+            _sum(weight, radiance, begin[part], begin[part + 1], total[part])
         for j in range(terms):
             scale, scale0, scale1 = _scales(albedo, p, j, total[0, j, WEIGHT], total[1, j, WEIGHT])
-            total[0, j, WEIGHT] = total[1, j, WEIGHT] = 0
-            target, place = where[0][p], where[1][j]
-            for c in range(CHANNELS):
-                smooth0, smooth1 = total[0, j, c], total[1, j, c]
-                bright0, bright1 = total[0, j, CHANNELS + c], total[1, j, CHANNELS + c]
-                out[target, place, c] = (smooth0 + smooth1) * scale + bright0 + bright1
-                gap[target, place, c] = smooth0 * scale0 - smooth1 * scale1 + f32(2) * (bright0 - bright1)
+            place = (where[0][p] * stored + where[1][j]) * CHANNELS
+            smooth0, smooth1 = load(total, j * CHANNELS), load(total, (terms + j) * CHANNELS)
+            bright0, bright1 = load(total, (2 * terms + j) * CHANNELS), load(total, (3 * terms + j) * CHANNELS)
+            store(out, place, (smooth0 + smooth1) * scale + (bright0 + bright1))
+            store(gap, place, smooth0 * scale0 - smooth1 * scale1 + (bright0 - bright1) * f32(2))
+            out[where[0][p], where[1][j], WEIGHT] = gap[where[0][p], where[1][j], WEIGHT] = 0
+
+
+@fast
+def _sum(weight, radiance, begin, end, total):  # type: ignore[no-untyped-def]
+    """Sums of the radiance of some rays by their weights. Args: weight: (1 + 2 K, S). radiance: (S, CHANNELS). total: written.
+
+    Two at a time, so that additions need not wait for each other.
+    """
+    knots = len(weight) // 2
+    for j in range(knots + 1):
+        other = knots + j if j > 0 else 0
+        a, b = fill(np.float32(0)), fill(np.float32(0))
+        for i in range(begin, end):
+            seen = load(radiance, i * CHANNELS)
+            a = a + seen * weight[j, i]
+            b = b + seen * weight[other, i]
+        store(total, j * CHANNELS, a)
+        store(total, other * CHANNELS, b)
+
+
+@inline
+def _on_square(dx, dy, dz, count, us, vs):  # type: ignore[no-untyped-def]
+    """Where rays look on the octahedral square, the inverse of `on_square`, to 1e-5; `count` is a multiple of LANES.
+
+    Source: Abramowitz & Stegun 1964, 4.4.49 (arctangent).
+    """
+    f32 = np.float32
+    none, one = fill(f32(0)), fill(f32(1))
+    for i in range(0, count, LANES):
+        x, y, z = load(dx, i), load(dy, i), load(dz, i)
+        across, along, up = larger(x, none - x), larger(y, none - y), larger(z, none - z)
+        most = larger(across, along)
+        r = smaller(across, along) / larger(most, fill(f32(1e-30)))
+        q = r * r
+        turns = ((((q * f32(0.0208351) - f32(0.0851330)) * q + f32(0.1801410)) * q - f32(0.3302995)) * q + f32(0.9998660)) * r
+        turns = turns * f32(2 / math.pi)
+        turns = where_positive(along - across, one - turns, turns)
+        radius = root(larger(one - up, none))
+        v = turns * radius
+        u = radius - v
+        u, v = where_positive(none - z, one - v, u), where_positive(none - z, one - u, v)
+        u, v = where_positive(none - x, none - u, u), where_positive(none - y, none - v, v)
+        store(us, i, u * f32(0.5) + f32(0.5))
+        store(vs, i, v * f32(0.5) + f32(0.5))
 
 
 @fast
@@ -553,10 +630,9 @@ def accumulate_bounce(  # type: ignore[no-untyped-def]
     counts, bounds, _, principled = sampled
     _, directions, _, _, row = rays
     points, slots = row.shape
-    terms = albedo.shape[1]
+    terms, slots = albedo.shape[1], in_lanes(slots)
     dx, dy, dz = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
-    s5, sin2, cos2 = np.empty(slots, np.float32), np.empty(slots, np.float32), np.empty(slots, np.float32)
-    scratch = (s5, sin2, cos2, np.empty(slots, np.float32))
+    scratch = np.empty((6, LANES), np.float32)
     density, inverse = np.empty(slots, np.float32), np.empty(slots, np.float32)
     number = np.empty(slots, np.int32)
     weights = np.empty(terms * slots, np.float32)
@@ -574,10 +650,12 @@ def accumulate_bounce(  # type: ignore[no-untyped-def]
                     number[m] = hit[r]
                     any_hit |= hit[r] >= 0
                     m += 1
-            weight = weights[: terms * m].reshape((terms, m))
-            weigh(n, t, b, wo, p, (dx, dy, dz), m, alphas, counts, principled, scratch, density, inverse, weight)
+            count = in_lanes(m)
+            dx[m:count], dy[m:count], dz[m:count] = n[p, 0], n[p, 1], n[p, 2]
+            weight = weights[: terms * count].reshape((terms, count))
+            weigh(n, t, b, wo, p, (dx, dy, dz), count, alphas, counts, principled, scratch, density, inverse, weight)
             for j in range(terms):
-                normaliser[half, j] = weight[j].sum()
+                normaliser[half, j] = weight[j, :m].sum()
                 for i in range(m):
                     if number[i] >= 0:
                         for c in range(CHANNELS):

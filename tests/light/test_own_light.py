@@ -147,7 +147,8 @@ def test_parallel_mirrors_a_hair_apart_keep_their_energy() -> None:
     """Two plates that face each other at a thousandth of their size: finite, and never brighter than the light."""
     near, far = scenes.square(2, 0.0, -0.5, 0.5), scenes.square(2, 0.001, -0.5, 0.5)[::-1]
     direct, full = shaded(scenes.quads(near, far), scenes.view_of(scenes.quads(near, far), 24), scenes.even_light(), MIRROR, 8)
-    assert np.isfinite(full).all() and full.max() < 1.02 and (full >= direct).all()
+    assert np.isfinite(full).all() and full.max() < 1.02
+    assert (full >= direct - 1e-9).all()  # what is dark is 0 but for the rounding of interpolation, 1e-10
 
 
 def test_a_closed_box_with_a_slit_is_lit_through_it_alone() -> None:

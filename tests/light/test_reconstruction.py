@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from stages.light import reconstruction
 from stages.light.reconstruction import Neighbours, largest, noise_left, smoothed, variance
 
 
@@ -108,3 +109,40 @@ def test_largest() -> None:
     assert largest(values, 0.5).tolist() == [[True, False], [False, True], [True, False]]
     assert not largest(values, 0.0).any()
     assert largest(np.ones((10, 1), np.float32), 0.3).sum() == 3
+
+
+def averaged_plainly(mean: np.ndarray, noise: np.ndarray, near: Neighbours, power: int, joint: tuple[int, ...]) -> np.ndarray:
+    """`_weighted`, one point and one neighbour after the other, in float64."""
+    mean, noise = mean.astype(np.float64), noise.astype(np.float64)
+    values, result = mean if power == 1 else noise, np.empty_like(mean)
+    noisy = (noise > 0).any((0, 2))
+    shared = [k for k in joint if noisy[k]]
+    for p, (x, y) in enumerate(near.pixel):
+        total, weight = values[p].copy(), np.ones_like(mean[p])
+        window = near.index[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3].ravel()
+        for q in window[(window >= 0) & (window != p)]:
+            step = (near.point[q] - near.point[p]).astype(np.float64)
+            out = step @ near.n[p]
+            same = max(0, 1 - reconstruction.NORMALS * np.square(near.n[p] - near.n[q]).sum())
+            same *= max(0, 1 - out**2 / (step @ step * reconstruction.BEND))
+            unlike = np.square(mean[p] - mean[q]) / (noise[p] + np.minimum(noise[p], noise[q]) + 1e-20)
+            counts = noise[p, 0] > 0
+            same *= max(0, 1 - unlike[0][counts].clip(0, 1e9).sum() / (reconstruction.TOGETHER * max(counts.sum(), 1)))
+            unlike[shared] = unlike[shared].mean(0) if shared else 0
+            w = same * np.maximum(0, 1 - unlike / reconstruction.TOLERANCE) ** 2 * noisy[:, None]
+            total, weight = total + w**power * values[q], weight + w
+        result[p] = total / weight**power
+    return result
+
+
+@pytest.mark.parametrize("power", (1, 2))
+@pytest.mark.parametrize(("channels", "joint"), ((3, ()), (16, (1, 3))))
+def test_averages_are_what_they_are_one_by_one(channels: int, joint: tuple[int, ...], power: int) -> None:
+    generator, near = np.random.default_rng(2), plane(9, 11)
+    near.n[near.pixel[:, 0] > 7] = [0, 0.6, 0.8]  # a bend
+    near.n[near.pixel[:, 1] > 6] = [0, 0.06, 0.998]
+    mean = generator.uniform(0, 1, (len(near.n), 4, channels)).astype(np.float32)
+    noise = generator.uniform(0, 0.2, mean.shape).astype(np.float32)
+    noise[:, 2] = noise[::3, :, 1] = 0
+    found = reconstruction._weighted(mean, noise, near, power, joint)
+    assert found == pytest.approx(averaged_plainly(mean, noise, near, power, joint), rel=2e-5, abs=1e-6)
