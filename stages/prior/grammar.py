@@ -7,6 +7,7 @@ no table knows, a dictionary may explain by colours; the rest is kept as unknown
 from collections.abc import Callable, Container, Mapping, Sequence
 from itertools import takewhile
 
+from stages.prior.colors import COLORS
 from stages.prior.context import understood
 from stages.prior.motifs import PAINTS
 from stages.prior.objects import OBJECTS
@@ -182,7 +183,9 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         if early and phrase.join.kind in ("", "and"):
             return  # "a checkerboard marble plinth", "blue and white gingham cushion"
         phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "with a red gingham lid"
-    elif kind == "part" and text.startswith(("around", "along the")) and phrase.where in RINGS:
+    elif kind == "part" and text.startswith("around") and phrase.where in ("trim", "edging", "border", "outline"):
+        return  # "gold trim around the visor"
+    elif kind == "part" and text.startswith(RINGED) and phrase.where in RINGS:
         region = token.value if token.value.share < BAND or token.value.kind == "middle" else token.value._replace(share=BAND)
         phrase.region, phrase.where, phrase.placed = region, text, phrase.says_what  # "a gold ring around the top"
     elif kind == "part" and phrase.where in SHAPES and (phrase.says_what or phrase.where.split(" ")[0] in PAINTS):
@@ -201,6 +204,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.animal = text
 
 
+RINGED = ("around", "along the", "on top", "on the top", "at the top", "near the top", "at the base", "at the bottom")
 RINGS, BAND = ("ring", "rings", "band", "bands", "stripe", "stripes", "line", "lines", "strap", "hoop", "hoops"), 0.08
 """Patterns of which one lies around a place, and its share of the extent."""
 
@@ -227,8 +231,9 @@ def _name(phrase: Phrase, text: str) -> None:
     elif text in FIGURES and old not in (*GENERIC, *PAINTED):  # "a brass horn", "with an obsidian hide"
         if phrase.join is not FIRST and phrase.region is None:
             phrase.region, phrase.where = (PARTS["body"], "body") if text in COATS else (DETAILS, text)
-    elif old == "painted" and family(text) in ("metal", "wood"):
-        phrase.substance = f"painted {family(text)}"  # "painted yellow metal"
+    elif old in ("painted", "powder-coated", "powder coated") and family(text) in ("metal", "wood"):
+        phrase.substance = f"painted {family(text)}"  # "painted yellow metal", "powder-coated black steel"
+        phrase.colors += [word for word in text.split(" ") if word in COLORS and not phrase.colors]
     elif KNOWN[old][0].look == KNOWN[text][0].look and old not in GENERIC:
         return  # "thatched straw"
     elif text == "shell" and family(old) in ("plastic", "metal", "paint"):

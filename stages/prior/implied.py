@@ -19,7 +19,10 @@ def implied(phrases: list[Phrase]) -> None:
 
 def _alone(phrases: list[Phrase]) -> None:
     """A part that is all that is named is the thing: "a tire"."""
-    first = phrases[0]
+    first, last = phrases[0], phrases[-1]
+    listed = all(p.join.kind == "and" and not p.thing for p in phrases[1:]) and all(p.color_only for p in phrases[:-1])
+    if len(phrases) > 1 and listed and last.where in OBJECTS and last.where in PARTS:
+        last.thing, last.region, last.where = last.where, None, ""  # "a blue and yellow tartan cushion"
     thing = next((name for name in (first.where, *singulars(first.where)) if name in OBJECTS), "")
     if not first.says_what and thing and len(phrases) == 1:
         phrases[0] = replace(first, thing=thing, region=None, where="")

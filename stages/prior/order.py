@@ -177,6 +177,15 @@ def _covers(phrase: Phrase) -> bool:
     return phrase.join.kind in ("all", "cover", "comma") and not (gathers or set(phrase.weather) & PEELS)
 
 
+def _flaked(first: Phrase, over: list[Phrase]) -> Order:
+    """A thing whose paint peels is what paint is on: "a car door with peeling turquoise paint"."""
+    usual = split(OBJECTS[first.thing].made)[0] if first.thing and not first.says_stuff else Phrase()
+    peels = any(p.coats and set(p.weather) & PEELS and not p.region and p.join.kind == "with" and not p.shows for p in over)
+    if peels and usual.substance and family(usual.substance) == "paint":
+        return replace(first, substance="wood" if "wood" in usual.substance else "steel"), over
+    return first, over
+
+
 RUSTY = {"rusty", "rusted"}
 
 
@@ -290,7 +299,7 @@ def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
 
 
 STEPS = (
-    in_its_places, _largest, _framed, _panelled, _clothed, _of_body, _told_after, _either_side, _bared, _smaller_last,
+    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _of_body, _told_after, _either_side, _bared, _smaller_last,
     _dirt_last, _edges_apart,
 )  # fmt: skip
 """What orders phrases, one after the other."""

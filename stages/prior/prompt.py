@@ -135,7 +135,7 @@ class Reading:
         """The base's coat, as a layer, and what lies on it of itself: its weather, an animal's marks, a thing's own parts but
         for those of which words say what they are. Args: said: regions of which words speak."""
         made = split(OBJECTS[base.thing].made) if base.thing and not (base.substance or base.unknown or base.animal) else []
-        if len(made) > 1 and not base.colors:
+        if len(made) > 1 and base.colors in ([], made[0].colors):
             inner, over = in_its_places(*ordered(made), base.thing)
             inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
             coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
@@ -207,7 +207,8 @@ class Reading:
         gathers = GATHERS.get(gathering(phrase.substance))
         if gathers and phrase.where in ("on top", "on the top", "on top of it"):
             return Region("up", min(0.45, gathers.share) if gathers.kind == "up" else 0.45, gathers.size, gathers.wear)
-        if phrase.where in ("on top", "on the top") and phrase.substance and _family(phrase) == "organic" and not gathers:
+        cut = bool(phrase.substance) and _family(phrase) in ("organic", "wood")
+        if phrase.where in ("on top", "on the top") and cut and not gathers:
             return Region("up", 0.4)  # "a cake with strawberries on top"
         if gathers and phrase.region and phrase.region.kind == "all":
             return gathers  # "ivy climbing the walls"

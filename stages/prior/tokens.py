@@ -127,8 +127,8 @@ SIMILES = (
     (r"\b(?:with|in|and) (?:an? |the )?((?:(?!(?:with|and|or) )[a-z-]+ ){0,3}?[a-z-]+) "
      r"(?:finish|coating|paint job|paintwork|surface|texture|look)\b", r"finished in \1"),
     (r"\b(?:an? )?(?:crackled?|cracked|crazed|craquelure) (?:glaze|glazing)\b", "glaze crackled"),
-    (r",\s*(?:on |against )?(?:an? )?(?:plain |clean )?(?:white|black|gr[ea]y|dark|neutral|transparent|plain|clean|studio) "
-     r"background\b", ","),
+    (r"(?:,\s*(?:on |against )?|\s(?:on|against) )(?:an? )?(?:plain |clean )?"
+     r"(?:white|black|gr[ea]y|dark|neutral|transparent|plain|clean|studio) background\b", ","),
     (r"(?:(?<=with )|(?<=and )|(?<=, )|^)(?:hazard|warning|caution) (?:stripes|striping|tape)\b",
     "yellow and black stripes"),
     (r",? half[- ](?:dipped|submerged|buried) in\b", ", lower half"),
@@ -375,7 +375,8 @@ def _resolved(found: list[Token]) -> list[Token]:
     return result
 
 
-BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beetle", "armadillo")
+BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beetle", "armadillo", "ladybug",
+           "ladybird")
 """Beasts with a shell."""
 
 
@@ -460,6 +461,7 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("part", {f"up from {the}{place}": Region("below", 0.45) for the in ("", "the ", "its ") for place in PARTS})
     for side, strip in (("base", "below"), ("bottom", "below"), ("top", "above")):
         enter("part", {f"{word} {side}": Region(strip, 0.18) for word in ("along the", "along its")})
+    enter("part", {"on one side": Region("right", 0.4), "on the other side": Region("left", 0.4)})
     enter("aside", ASIDE)
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
     for known, *others in rows("spellings.tsv"):
