@@ -84,9 +84,9 @@ class Bounces:
         return found
 
 
-def read_environment(folder: Path, name: str, files: Mapping[str, str] | None) -> Environment:
-    """An environment that conditions kept. Raises: ArtifactError."""
-    path = folder / "environments" / f"{name}.exr"
+def read_environment(folder: Path, name: str, files: Mapping[str, str]) -> Environment:
+    """An environment that conditions kept. Args: files: of the manifest. Raises: ArtifactError."""
+    path = intact(folder, f"environments/{name}.exr", files)
     channels = read_exr(path).channels
     if not all(c in channels for c in "RGB"):
         raise ArtifactError(f"{path}: expected channels R, G and B; make the conditions again")

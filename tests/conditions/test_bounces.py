@@ -14,6 +14,7 @@ from dreammat_cli.main import main
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import conditions
 from stages.core.artifact import load_npz, read_manifest
+from stages.core.errors import ArtifactError
 from stages.core.schemas import BOUNCES, CONDITIONS, VIEW_BOUNCES
 from stages.core.shading import Material, shade
 from stages.distill.sampling import CropSampler, PixelSampler
@@ -145,3 +146,13 @@ def test_a_damaged_file_is_told_in_one_line(
     said = capsys.readouterr().err.strip().splitlines()
     assert len(said) == 1 and name in said[0]
     assert not (tmp_path / "m.npz").exists()
+
+
+def test_an_environment_that_was_exchanged_is_refused(folder: Path, tmp_path: Path) -> None:
+    """Another light under its name, whole in itself, is not what the views were lit by."""
+    exchanged = tmp_path / "conditions"
+    shutil.copytree(folder, exchanged)
+    (exchanged / "environments" / "studio.exr").unlink()  # copies may share their bytes
+    shutil.copy(folder / "environments" / "clear_sky.exr", exchanged / "environments" / "studio.exr")
+    with pytest.raises(ArtifactError, match=r"environments/studio\.exr: damaged"):
+        Views(exchanged)
