@@ -156,11 +156,11 @@ def on_steps(directions):  # type: ignore[no-untyped-def]
 
 @compiled
 def from_steps(steps):  # type: ignore[no-untyped-def]
-    """The inverse of `on_steps`."""
-    result = np.empty((len(steps), 3), np.float32)
+    """The inverse of `on_steps`, its components one after the other: (3, R)."""
+    result = np.empty((3, len(steps)), np.float32)
     for i in range(len(steps)):
         x, y, z = on_square(steps[i, 0] * np.float32(1 / STEPS), steps[i, 1] * np.float32(1 / STEPS))
-        result[i, 0], result[i, 1], result[i, 2] = x, y, z
+        result[0, i], result[1, i], result[2, i] = x, y, z
     return result
 
 

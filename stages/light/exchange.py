@@ -17,7 +17,7 @@ from stages.light.cells import Cells, probes
 from stages.light.ends import DARK, STEPS, Ends, from_steps
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
-from stages.light.leaving import Around, OwnLight, Sky, make_sky, open_sky, received, reflectance
+from stages.light.leaving import MOST, Around, OwnLight, Sky, make_sky, open_sky, received, reflectance
 from stages.light.light_set import MAX_LIGHTS
 from stages.light.scene import Scene
 from stages.light.terms import Terms, between_cosines
@@ -51,6 +51,7 @@ class Exchange:
         direct = np.ascontiguousarray(self.direct.reshape(len(self.direct), -1))
         dark = np.zeros_like(direct)
         around = Around(self.ends.start, from_steps(self.ends.towards), self.angle)
+        assert np.diff(self.ends.start).max(initial=0) <= MOST
         shown = open_sky(self.ends, self.angle, self.sky)
         own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, shown, around)
         reflected = np.tile(reflectance(material), direct.shape[1] // 3)

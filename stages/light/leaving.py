@@ -5,6 +5,7 @@ lobe: the sky along those that end on nothing, and other sides. Where it is smoo
 blurred a little, or another side, of which the same is asked once more. After two mirrors, a side sends alike to everywhere.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from stages.light.environment import Environment
 from stages.light.light_set import bordered
 from stages.light.octahedral import octahedral
 from stages.light.prefilter import blurred
-from stages.light.transport_kernels import on_square
+from stages.light.transport_kernels import fast, on_square
 
 ROUGHNESS = (0.0, 0.25, 0.5, 0.75, 1.0)
 SIZES = (512, 64, 64, 32, 32)
@@ -40,6 +41,9 @@ POINTS_PER_TASK = 1 << 11
 
 RAYS_PER_TASK = 1 << 16
 
+MOST = 256
+"""Rays of a side at most."""
+
 
 class Sky(NamedTuple):
     """L environments, blurred by each of ROUGHNESS: texels (T, 3 L), level after level, each with a border of one texel; first
@@ -52,7 +56,7 @@ class Sky(NamedTuple):
 class Around(NamedTuple):
     """All around the sides of an object's cells, as their R rays meet it, side after side.
 
-    start: (S + 1,) where a side's rays begin. direction: (R, 3). angle: (R,), solid angle that each stands for, steradians.
+    start: (S + 1,) where a side's rays begin. direction: (3, R). angle: (R,), solid angle that each stands for, steradians.
     """
 
     start: NDArray[np.int32]
@@ -239,38 +243,51 @@ def _rougher(roughness, other):  # type: ignore[no-untyped-def]
     return min(np.sqrt(np.sqrt(a * a + b * b)), np.float32(1))
 
 
+@fast
+def _lobe(direction, angle, d, n, a2, weight):  # type: ignore[no-untyped-def]
+    """Weights of a side's rays in its gloss towards -d, written to `weight`. Args: direction: three components, (K,) each."""
+    f32 = np.float32
+    x, y, z = direction
+    n_o = max(-(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), f32(MIN_COSINE))
+    masking = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) / (n_o * n_o) - f32(1)))
+    for i in range(len(x)):
+        cosine = n[0] * x[i] + n[1] * y[i] + n[2] * z[i]
+        n_i = max(cosine, f32(MIN_COSINE))
+        square = f32(2) - f32(2) * (d[0] * x[i] + d[1] * y[i] + d[2] * z[i])  # of the half vector's length
+        cos2 = min((n_i + n_o) * (n_i + n_o) / max(square, f32(1e-6)), f32(1))
+        q = f32(1) - cos2 + a2 * cos2
+        shadowing = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) / (n_i * n_i) - f32(1)))
+        weight[i] = angle[i] / (q * q * (masking + shadowing)) if cosine > f32(MIN_COSINE) else f32(0)
+
+
 @compiled
-def _around(side, one, two, roughness, own, out):  # type: ignore[no-untyped-def]
+def _around(side, one, two, roughness, own, scratch, out):  # type: ignore[no-untyped-def]
     """What a side's own rays show to its gloss, their mean by the lobe, written to `out`. Returns: whether there are any.
 
-    Args: one, two: of `Ends`, the direction of a ray and that of its mirror image.
+    Args: one, two: of `Ends`, the direction of a ray and that of its mirror image. scratch: of MOST weights.
     """
     f32 = np.float32
     start, direction, angle = own.around
-    dx, dy, dz = on_square(one[0] * f32(1 / STEPS), one[1] * f32(1 / STEPS))
-    nx, ny, nz = on_square(two[0] * f32(1 / STEPS), two[1] * f32(1 / STEPS))
-    nx, ny, nz = nx - dx, ny - dy, nz - dz
-    length = max(np.sqrt(nx * nx + ny * ny + nz * nz), f32(1e-6))
-    nx, ny, nz = nx / length, ny / length, nz / length
-    n_o = max(length * f32(0.5), f32(MIN_COSINE))
-    a2 = roughness**4
-    masking = f32(0.5) + f32(0.5) * np.sqrt(f32(1) + a2 * (f32(1) - n_o * n_o) / (n_o * n_o))
+    rays = slice(start[side], start[side + 1])
+    d = on_square(one[0] * f32(1 / STEPS), one[1] * f32(1 / STEPS))
+    x, y, z = on_square(two[0] * f32(1 / STEPS), two[1] * f32(1 / STEPS))
+    x, y, z = x - d[0], y - d[1], z - d[2]
+    scale = f32(1) / max(math.sqrt(x * x + y * y + z * z), f32(1e-6))
+    blurred = f32(ROUGHNESS[1] ** 4)  # the sky is, by so much
+    a2 = max(roughness**4 - blurred, blurred)
+    weight = scratch[: rays.stop - rays.start]
+    where = direction[0, rays], direction[1, rays], direction[2, rays]
+    _lobe(where, angle[rays], d, (x * scale, y * scale, z * scale), a2, weight)
     out[:] = 0
     total = f32(0)
-    for i in range(start[side], start[side + 1]):
-        n_i = nx * direction[i, 0] + ny * direction[i, 1] + nz * direction[i, 2]
-        if n_i <= f32(MIN_COSINE) or angle[i] == f32(0):
-            continue
-        hx, hy, hz = direction[i, 0] - dx, direction[i, 1] - dy, direction[i, 2] - dz
-        cos2 = min((n_i + n_o) * (n_i + n_o) / max(hx * hx + hy * hy + hz * hz, f32(1e-9)), f32(1))
-        q = f32(1) - cos2 + a2 * cos2
-        slope = f32(0.5) * np.sqrt(f32(1) + a2 * (f32(1) - n_i * n_i) / (n_i * n_i))
-        weight = angle[i] / (q * q * (masking + slope - f32(0.5)))
-        total += weight
+    for i in range(len(weight)):
+        total += weight[i]
         for c in range(len(out)):
-            out[c] += weight * own.brought[i, c]
+            out[c] += weight[i] * own.brought[rays.start + i, c]
     if total > f32(0):
-        out /= total
+        scale = f32(1) / total
+        for c in range(len(out)):
+            out[c] *= scale
     return total > f32(0)
 
 
@@ -301,23 +318,24 @@ def _along(ray, rays, lobe, least, own, sky, tables, scratch, shown):  # type: i
     if side >= DARK:
         shown[:] = 0
         return
+    weight, seen = scratch
     rough = _rougher(max(own.material[side, 3], least), lobe)
     wide = min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
-    if wide > f32(0) and not _around(side, towards, onward, rough, own, scratch):
+    if wide > f32(0) and not _around(side, towards, onward, rough, own, weight, seen):
         wide = f32(0)
     if wide < f32(1):
         _mirror_there(ray, rays, rough, own, sky, tables, shown)
         for c in range(len(shown)):
-            shown[c] += wide * (scratch[c] - shown[c])
+            shown[c] += wide * (seen[c] - shown[c])
     else:
-        shown[:] = scratch
+        shown[:] = seen
     _send(own.material[side], _cosine(towards, onward), own.light[side], tables, shown)
 
 
 @compiled
 def _arriving(start, mirror, rays, own, sky, tables, out):  # type: ignore[no-untyped-def]
     """`arriving`; start begins at the first of the rays that are wanted."""
-    scratch = np.zeros(out.shape[1], np.float32)
+    scratch = np.empty(MOST, np.float32), np.zeros(out.shape[1], np.float32)
     for ray in range(start[0], start[-1]):
         _along(ray, rays, np.float32(0), np.float32(SOFT), own, sky, tables, scratch, out[ray - start[0]])
 
@@ -325,7 +343,7 @@ def _arriving(start, mirror, rays, own, sky, tables, out):  # type: ignore[no-un
 @compiled
 def _mirrored(start, mirror, rays, least, own, sky, tables, out):  # type: ignore[no-untyped-def]
     """`mirrored`; start begins at the first of the points that are wanted."""
-    scratch = np.zeros(out.shape[2], np.float32)
+    scratch = np.empty(MOST, np.float32), np.zeros(out.shape[2], np.float32)
     for p in range(len(mirror)):
         if mirror[p]:
             for k in range(least.shape[1]):
@@ -338,4 +356,5 @@ def _shown(side, towards, angle, sky, out):  # type: ignore[no-untyped-def]
     for i in range(len(side)):
         if side[i] == OPEN:
             width = np.sqrt(angle[i] * np.float32(0.25 / np.pi))  # half the radius of what the ray stands for
-            _look_up(sky, towards[i], min(np.sqrt(np.float32(0.5) * width), np.float32(1)), out[i])
+            blur = max(np.sqrt(np.float32(0.5) * width), np.float32(ROUGHNESS[1]))  # else suns fall between the rays
+            _look_up(sky, towards[i], min(blur, np.float32(1)), out[i])

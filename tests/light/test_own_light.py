@@ -81,7 +81,7 @@ def test_one_bounce_is_that_of_the_quadrature(values: tuple[float, ...], energy:
     assert found.mean() == pytest.approx(exact.mean(), rel=energy)
 
 
-@pytest.mark.parametrize(("roughness", "energy"), ((0.45, 0.02), (0.3, 0.04)))
+@pytest.mark.parametrize(("roughness", "energy"), ((0.45, 0.02), (0.3, 0.04), (0.22, 0.06)))
 def test_a_metal_bowl_keeps_its_light(roughness: float, energy: float) -> None:
     """Gold seen in gold, where the sky is bright above: of a lobe that the bowl half hides, the brighter half is left."""
     scene, values = scenes.bowl(), (1.0, 0.77, 0.34, roughness, 1.0)
