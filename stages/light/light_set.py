@@ -84,13 +84,12 @@ class LightSet:
 class Texels(NamedTuple):
     """The excess texels of one environment after the other, along a Morton curve, on which every cell is a stretch: T in all.
 
-    place: (T,) int32, row times FINE plus column. cumulative: (T,) float64, running sum of their shares of their environment's
-    energy. guide: (T,) int32, the i-th of a cell's n texels holds which one of them is met at i / n of the cell's energy.
-    radiance: (T, 3) float32.
+    lot: (T, 4) float32, of the energy of its cell what lies before a texel on the curve, and its own share; its column and row.
+    guide: (T,) int32, the i-th of a cell's n texels holds which one of them is met at i / n of the cell's energy. radiance:
+    (T, 3) float32.
     """
 
-    place: NDArray[np.int32]
-    cumulative: NDArray[np.float64]
+    lot: NDArray[np.float32]
     guide: NDArray[np.int32]
     radiance: NDArray[np.float32]
 
@@ -187,9 +186,18 @@ def _cells(energy: NDArray, peaks: Sequence[NDArray]) -> tuple[Texels, Cells]:
         np.array(first),
         number,
     )
-    cumulative = np.cumsum(np.concatenate(energies))
-    guide = _guide(cumulative, cells.begin)
-    return Texels(np.concatenate(texels).astype(np.int32), cumulative, guide, np.concatenate(radiance)), cells
+    before, part = _shares(np.concatenate(energies), cells.begin)
+    row, column = np.divmod(np.concatenate(texels), FINE)
+    lot = np.stack([before, part, column, row], -1).astype(np.float32)
+    return Texels(lot, _guide(before, cells.begin), np.concatenate(radiance)), cells
+
+
+def _shares(energy: NDArray[np.float64], begin: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of the energy of their cell, what lies before each texel and its own share: (T,) each."""
+    length = begin[:, 1] - begin[:, 0]
+    share = energy / np.add.reduceat(energy, begin[:, 0]).repeat(length) if len(energy) else energy
+    before = np.cumsum(share) - share
+    return (before - before[begin[:, 0]].repeat(length)).clip(0, 1), share
 
 
 def _cut(code: NDArray[np.int64], energy: NDArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -206,12 +214,12 @@ def _cut(code: NDArray[np.int64], energy: NDArray) -> tuple[NDArray[np.int64], N
         size *= 2
 
 
-def _guide(cumulative: NDArray[np.float64], begin: NDArray[np.int64]) -> NDArray[np.int32]:
+def _guide(before: NDArray[np.float64], begin: NDArray[np.int64]) -> NDArray[np.int32]:
     """`Texels.guide`. Source: Chen & Asau 1974, "On Generating Random Variates from an Empirical Distribution"."""
-    start, end = begin.repeat(begin[:, 1] - begin[:, 0], 0).T
-    low = np.where(start > 0, cumulative[start - 1], 0.0)
-    energy = low + (np.arange(len(start)) - start) / (end - start) * (cumulative[end - 1] - low)
-    return np.minimum(np.searchsorted(cumulative, energy, "right"), end - 1).astype(np.int32)
+    cell = np.arange(len(begin)).repeat(begin[:, 1] - begin[:, 0])
+    start, end = begin[cell].T
+    energy = (np.arange(len(start)) - start) / (end - start)
+    return (np.searchsorted(cell + before, cell + energy, "right") - 1).clip(start, end - 1).astype(np.int32)
 
 
 def _blocks(peaks: NDArray) -> tuple[NDArray[np.float32], NDArray[np.int32]]:

@@ -133,12 +133,13 @@ def draw(n, t, b, wo, start, pixel, samples, alphas, excess, chosen, rays):  # t
         offset0, offset1 = hashed(2 * lobe, seed), hashed(2 * lobe + 1, seed)
         if lobe >= lobes:
             up[:] = -1
-            some = False
+            some, turned = False, (offset1 + (i + 1) * GOLDEN) % 1.0
             for p in range(points):
                 k = cell[p, place]
                 if k >= 0:
-                    line = shift[pixel[p, 0], 1] + offset1 + (i + 1) * GOLDEN
-                    first[p], second[p], found[p], share[p] = _in_cell(k, within[p, place], line - math.floor(line), excess)
+                    line = f32(shift[pixel[p, 0], 1] + turned)
+                    line = min(line - np.floor(line), f32(0.9999))
+                    first[p], second[p], found[p], share[p] = _in_cell(k, within[p, place], line, excess)
                     share[p] *= f32(count) * chosen[p, k] * f32(FINE * FINE / (4 * math.pi))
                     up[p] = 1
                     some = True
@@ -331,20 +332,15 @@ def _in_cell(k, u, line, excess):  # type: ignore[no-untyped-def]
 
     The texel by its energy and u, the place across it by what is left of u and by `line`.
     """
-    place, cumulative, guide, _ = excess[0]
+    lot, guide, _ = excess[0]
     start, end = excess[1][k]
-    low = cumulative[start - 1] if start > 0 else 0.0
-    whole = cumulative[end - 1] - low
-    target = low + u * whole
-    i = guide[min(start + int(u * (end - start)), end - 1)]  # the first texel whose cumulative energy exceeds the target
-    while i < end - 1 and cumulative[i] <= target:
+    i = guide[min(start + int(u * np.float32(end - start)), end - 1)]
+    while i < end - 1 and lot[i + 1, 0] <= u:
         i += 1
-    if i > start:
-        low = cumulative[i - 1]
-    width = cumulative[i] - low  # 0 where the sum's rounding has swallowed the texel
-    across = min(max((target - low) / width, 0.0), 0.9999) if width > 0 else 0.5
-    share = np.float32(width / whole if width > 0 else 1.0)
-    return np.float32((place[i] % FINE + across) / FINE), np.float32((place[i] // FINE + line) / FINE), i, share
+    share = lot[i, 1]  # next to none where rounding leaves it no width
+    across = (u - lot[i, 0]) / share if share > np.float32(0) else np.float32(0.5)
+    across = min(max(across, np.float32(0)), np.float32(0.9999))
+    return (lot[i, 2] + across) * np.float32(1 / FINE), (lot[i, 3] + line) * np.float32(1 / FINE), i, share
 
 
 @inline

@@ -91,11 +91,11 @@ def test_densities_and_cells_cover_the_excess() -> None:
     cells = lights.cells
     assert cells.first.tolist()[:2] == [0, 0]
     assert cells.energy.sum() == pytest.approx(1, abs=1e-5)
-    assert lights.texels.cumulative[-1] == pytest.approx(1)
+    assert lights.texels.lot[:, 1].sum() == pytest.approx(len(cells.begin), rel=1e-4)
     side = FINE // CELLS
     x, y, z = texel_directions(FINE)
     for k, (start, end) in enumerate(cells.begin):
-        row, column = np.divmod(lights.texels.place[start:end], FINE)
+        column, row = lights.texels.lot[start:end, 2:].T.astype(int)
         assert (cells.number[1, row // side, column // side] == k).all()
         assert cells.energy[k] == pytest.approx(density[row, column, 1].sum(), rel=1e-4)
         assert len(row) <= np.pi * cells.radius[k] ** 2 / (4 * np.pi / FINE**2) * 1.001  # no more than its area holds
@@ -103,7 +103,7 @@ def test_densities_and_cells_cover_the_excess() -> None:
         assert away.max() < 3 * cells.radius[k]
     assert sorted(set(cells.number[cells.number >= 0])) == list(range(len(cells.begin)))
     shown = texels_of(lights, lights.fine[:, 3:6])
-    row, column = np.divmod(lights.texels.place, FINE)
+    column, row = lights.texels.lot[:, 2:].T.astype(int)
     assert lights.texels.radiance == pytest.approx(shown[row, column])
     assert module.MAX_LIGHTS * 3 < module.CHANNELS  # the last one is that of the weights
 
@@ -153,7 +153,7 @@ def test_light_rays_go_where_they_are_needed() -> None:
 
 
 def test_a_lamp_of_one_texel_is_hit_in_every_environment() -> None:
-    """Cumulative energies run on over environments, so that the second one's only texel has a width of its own."""
+    """Texels of all environments lie one after the other; the second one's only texel has a width of its own."""
     energy = np.zeros((FINE, FINE, 2))
     places = [(100, 40), (300, 411)]
     for e, (row, column) in enumerate(places):
@@ -173,18 +173,20 @@ def test_texels_are_drawn_by_their_energy() -> None:
     energy /= energy.sum()
     texels, cells = module._cells(energy, [np.ones((FINE, FINE, 3))])
     for k, (start, end) in enumerate(cells.begin):
-        below = texels.cumulative[start - 1] if start else 0.0
-        whole = texels.cumulative[end - 1] - below
-        for u in np.random.default_rng(6).random(500):
-            _, _, texel, share = _in_cell(k, u, 0.5, (texels, cells.begin, cells.first))
-            assert texel == np.searchsorted(texels.cumulative, below + u * whole, "right")
-            assert share == pytest.approx(energy.ravel()[texels.place[texel]] / whole, rel=1e-4)
+        column, row = texels.lot[start:end, 2:].T.astype(int)
+        share = energy[row, column, 0] / energy[row, column, 0].sum()
+        for u in np.random.default_rng(6).random(500).astype(np.float32):
+            _, _, texel, found = _in_cell(k, u, np.float32(0.5), (texels, cells.begin, cells.first))
+            before = share[: texel - start].sum()
+            assert before - 1e-6 <= u <= before + share[texel - start] + 1e-6
+            assert found == pytest.approx(share[texel - start], rel=1e-4)
 
 
 def test_a_cell_of_no_width_gives_a_direction() -> None:
     """Energy that is lost in the rounding of the sum must not make a ray that is not a number."""
     index = np.array([0, 1], np.int32)
-    texels = Texels(np.array([7, 9], np.int32), np.array([1.0, 1.0]), index, np.ones((2, 3), np.float32))
+    lot = np.array([[0, 1, 7, 0], [0, 0, 9, 0]], np.float32)
+    texels = Texels(lot, index, np.ones((2, 3), np.float32))
     assert np.isfinite(_in_cell(1, 0.3, 0.5, (texels, np.array([[0, 1], [1, 2]]), np.array([0, 2])))).all()
 
 
