@@ -131,7 +131,7 @@ class Look:
 
     def throws(self, light: Environment, bounces: int) -> Thrown | None:
         """What it throws on itself under a light; None where it sees next to nothing of itself."""
-        between = Between.of(self.scene, [light], 0)
+        between = Between.of(self.scene, [light], 0, bounces)
         if between is None:
             return None
         sides = between.cells.sides(self.scene)

@@ -347,7 +347,7 @@ def between_surfaces(
     if not options.bounces:
         return None
     progress("light between surfaces", 0, 1)
-    found = Between.of(scene, lights, options.seed)
+    found = Between.of(scene, lights, options.seed, options.bounces)
     progress("light between surfaces", 1, 1)
     return found
 

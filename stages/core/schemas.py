@@ -80,17 +80,17 @@ CONDITIONS = Schema(
 ENDS = {
     "start": Field("i4", ("P1",)),  # where each point's blocked rays begin; the last is a mirror's where `mirror` is not 0
     "mirror": Field("u1", ("P",)),
-    "side": Field("u2", ("R",)),  # side of a cell on which a ray ends; where a mirror there looks; and one there
-    "second": Field("u2", ("R",)),
-    "third": Field("u2", ("R",)),
-    **{f"lobe_{name}": Field("u1", ("Q", 2)) for name in ("towards", "onward", "beyond")},  # on the octahedral square
+    "side": Field("u2", ("R",)),  # side of a cell on which a ray ends
+    "second": Field("u2", ("M",)),  # where a mirror looks on which a mirror's ray ends; and one there
+    "third": Field("u2", ("M",)),
+    **{f"lobe_{name}": Field("u1", ("Q", 2)) for name in ("towards", "onward")},  # on the octahedral square
     **{f"mirror_{name}": Field("u2", ("M", 2)) for name in ("towards", "onward", "beyond")},
 }
 """Where blocked rays end, see `light.ends`."""
 
 BOUNCES = Schema(
     "dreammat.bounces",
-    2,
+    3,
     {
         **ENDS,  # of all rays of the sides; P1 is S + 1
         "weight": Field("f4", ("R",)),  # share in what a side receives
@@ -106,7 +106,7 @@ BOUNCES = Schema(
 )
 """Light between surfaces, whatever they are made of; see `light.exchange`."""
 
-VIEW_BOUNCES = Schema("dreammat.view_bounces", 1, ENDS)
+VIEW_BOUNCES = Schema("dreammat.view_bounces", 2, ENDS)
 """Where the blocked rays of a view's pixels end."""
 
 SURVEY = Schema(

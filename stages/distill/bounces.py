@@ -18,7 +18,7 @@ from stages.core.views import view_folder
 from stages.light.ends import Ends
 from stages.light.environment import Environment
 from stages.light.exchange import Exchange
-from stages.light.leaving import OwnLight, make_sky
+from stages.light.leaving import OwnLight
 from stages.light.own_light import with_own_light
 
 FILE = "bounces.npz"
@@ -41,9 +41,8 @@ class Bounces:
         expected = (2 * len(arrays["cell_label"]), len(environments), 3)
         if len(ends.mirror) != sides or arrays["direct"].shape != expected:
             raise ArtifactError(f"{folder / FILE}: its cells and their sides do not fit; make the conditions again")
-        lights = [read_environment(folder, name, files) for name in environments]
-        self._exchange = Exchange(arrays["direct"], ends, arrays["weight"], arrays["angle"], make_sky(lights))
-        self._skies = [make_sky([light]) for light in lights]
+        lights = tuple(read_environment(folder, name, files) for name in environments)
+        self._exchange = Exchange(arrays["direct"], ends, arrays["weight"], arrays["angle"], lights)
         self._counts = arrays["lobe_rays"].astype(np.int64)
         self.points, self.normals, scale = (torch.from_numpy(arrays[f"cell_{n}"]) for n in ("point", "normal", "scale"))
         self.label = torch.from_numpy(arrays["cell_label"].astype(np.int64))
@@ -54,7 +53,7 @@ class Bounces:
     def solved(self, material: Tensor) -> list[OwnLight]:
         """The light of an object whose cells are of these materials (C, 5), under each environment."""
         own = self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count)
-        parts = (np.split(a, len(self._skies), 1) for a in (own.light, own.before, own.sent, own.brought))
+        parts = (np.split(a, len(self._exchange.skies), 1) for a in (own.light, own.before, own.sent, own.brought))
         lights = (map(np.ascontiguousarray, part) for part in zip(*parts, strict=True))
         return [OwnLight(own.bounces, own.material, *(a, b, c, d), own.around) for a, b, c, d in lights]
 
@@ -66,7 +65,7 @@ class Bounces:
         Args: place: view and environment. rows: of the view's object pixels. n, wo: (P, 3) world.
         """
         view, environment = place
-        seen = (self.ends(view)[rows], own[environment], self._skies[environment], self._counts)
+        seen = (self.ends(view)[rows], own[environment], self._exchange.skies[environment], self._counts)
         return with_own_light(transport.to(torch.float32), n.numpy(), wo, *seen)
 
     def ends(self, view: int) -> Ends:
@@ -79,7 +78,7 @@ class Bounces:
         found = Ends.from_arrays(load_npz(intact(self._folder, name, self._files), VIEW_BOUNCES).arrays)
         with self._lock:
             self._held[view] = found
-            while len(self._held) > 1 and sum(array.nbytes for ends in self._held.values() for array in ends.rays) > HELD_BYTES:
+            while len(self._held) > 1 and sum(ends.nbytes for ends in self._held.values()) > HELD_BYTES:
                 self._held.popitem(last=False)
         return found
 

@@ -1,8 +1,9 @@
 """Where the blocked rays of a view's points end: what of the object each point sees, beside the light that it sees directly.
 
 Rays are those of the transport's lobes and of the mirror. One that is blocked tells the side of a cell (`stages.light.cells`)
-that it ends on, and where a mirror there would look: into the open, along a direction, or at another side. That is all that
-`stages.light.own_light` must know to say what comes along the ray, whatever the object is made of.
+that it ends on, and along which direction a mirror there would look; a mirror's ray also tells what that one would see: the
+open, or another side. That is all that `stages.light.own_light` must know to say what comes along the ray, whatever the object
+is made of: lobes see no gloss sharper than what the side's own rays show.
 
 Directions are kept in two 16-bit numbers on the octahedral square. Normal maps do not turn the mirrors that other points
 show, and what other objects of a scene block stays dark.
@@ -31,30 +32,41 @@ STEPS = 65535
 class Ends:
     """Ends of R rays of P points, point after point, a point's mirror ray last: the blocked ones, or all where so asked.
 
-    start: (P + 1,) where a point's rays begin. mirror: (P,) whether its last one is its mirror's. side, second, third: (R,)
-    where a ray ends, where a mirror there looks, and where one there. towards, onward, beyond: (R, 2) direction of the ray, and
-    of those mirrors.
+    start: (P + 1,) where a point's rays begin. mirror: (P,) whether its last one is its mirror's. side: (R,) where a ray ends.
+    towards, onward: (R, 2) direction of the ray, and of a mirror where it ends. second, third: (M,) of the M mirrors' rays
+    alone, where a mirror at their end looks, and where one there. beyond: (M, 2) direction of the latter.
     """
 
     start: NDArray[np.int32]
     mirror: NDArray[np.bool_]
     side: NDArray[np.uint16]
-    second: NDArray[np.uint16]
-    third: NDArray[np.uint16]
     towards: NDArray[np.uint16]
     onward: NDArray[np.uint16]
+    second: NDArray[np.uint16]
+    third: NDArray[np.uint16]
     beyond: NDArray[np.uint16]
 
     @property
     def rays(self) -> tuple[NDArray[np.uint16], ...]:
-        """All that is known of each ray."""
-        return self.side, self.second, self.third, self.towards, self.onward, self.beyond
+        """What is known of each ray."""
+        return self.side, self.towards, self.onward
+
+    @property
+    def mirrors(self) -> tuple[NDArray[np.uint16], ...]:
+        """What is known of each mirror's ray beside that."""
+        return self.second, self.third, self.beyond
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of it all."""
+        return sum(array.nbytes for array in (self.start, self.mirror, *self.rays, *self.mirrors))
 
     def __getitem__(self, rows: NDArray[np.int64]) -> "Ends":
         """Those of some points; -1 is the last."""
         start = np.concatenate([[0], np.cumsum(np.diff(self.start)[rows])]).astype(np.int32)
-        ray = self.numbers(rows)
-        return Ends(start, self.mirror[rows], *(a[ray] for a in self.rays))
+        ray, shown = self.numbers(rows), self.mirror[rows]
+        last = (np.cumsum(self.mirror) - 1)[rows][shown]
+        return Ends(start, shown, *(a[ray] for a in self.rays), *(a[last] for a in self.mirrors))
 
     def numbers(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """Which rays are those of some points, in their order."""
@@ -66,15 +78,15 @@ class Ends:
         """Those of the points of all parts."""
         before = np.cumsum([0, *(len(part.side) for part in parts[:-1])])
         start = np.concatenate([[0], *(part.start[1:] + n for part, n in zip(parts, before, strict=True))])
-        rays = (np.concatenate(arrays) for arrays in zip(*(part.rays for part in parts), strict=True))
+        rays = (np.concatenate(arrays) for arrays in zip(*((*part.rays, *part.mirrors) for part in parts), strict=True))
         return Ends(start.astype(np.int32), np.concatenate([part.mirror for part in parts]), *rays)
 
     def to_arrays(self) -> dict[str, NDArray]:
         """As `core.schemas.ENDS` has them: directions of lobes, which see nothing sharp, in 8 bits, those of mirrors in 16."""
         last = _last(self.start, self.mirror)
         arrays: dict[str, NDArray] = {"start": self.start, "mirror": self.mirror.astype(np.uint8)}
-        arrays |= {"side": self.side, "second": self.second, "third": self.third}
-        for name in ("towards", "onward", "beyond"):
+        arrays |= {"side": self.side, "second": self.second, "third": self.third, "mirror_beyond": self.beyond}
+        for name in ("towards", "onward"):
             steps = getattr(self, name)
             arrays[f"lobe_{name}"] = np.rint(steps[~last] / (STEPS / 255)).astype(np.uint8)
             arrays[f"mirror_{name}"] = steps[last]
@@ -86,18 +98,19 @@ class Ends:
         start, mirror = arrays["start"], arrays["mirror"] != 0
         last = _last(start, mirror)
         directions = []
-        for name in ("towards", "onward", "beyond"):
+        for name in ("towards", "onward"):
             steps = np.empty((len(last), 2), np.uint16)
             steps[~last] = arrays[f"lobe_{name}"].astype(np.uint16) * np.uint16(STEPS // 255)
             steps[last] = arrays[f"mirror_{name}"]
             directions.append(steps)
-        return Ends(start, mirror, arrays["side"], arrays["second"], arrays["third"], *directions)
+        far = (arrays[name] for name in ("second", "third", "mirror_beyond"))
+        return Ends(start, mirror, arrays["side"], *directions, *far)
 
     @staticmethod
     def none(points: int) -> "Ends":
         """Of points that see nothing of the object."""
         short, pair = np.zeros(0, np.uint16), np.zeros((0, 2), np.uint16)
-        return Ends(np.zeros(points + 1, np.int32), np.zeros(points, np.bool_), short, short, short, pair, pair, pair)
+        return Ends(np.zeros(points + 1, np.int32), np.zeros(points, np.bool_), short, pair, pair, short, short, pair)
 
 
 def _last(start: NDArray[np.int32], mirror: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -108,27 +121,31 @@ def _last(start: NDArray[np.int32], mirror: NDArray[np.bool_]) -> NDArray[np.boo
 
 
 def find_ends(
-    scene: Scene, cells: Cells, points: int, point: NDArray, mirror: NDArray, origin: NDArray, direction: NDArray
+    scene: Scene, cells: Cells, points: int, found: tuple[NDArray, NDArray, NDArray], origin: NDArray, direction: NDArray
 ) -> Ends:
     """Follow some rays, ordered by their points.
 
     Args:
-        points: how many there are. point: (R,) number of each ray's, ascending. mirror: (R,) whether a ray is its point's
-        mirror ray, the last one then. origin, direction: (R, 3).
+        points: how many there are. found: (R,) each, the number of a ray's point, ascending; whether it is its point's mirror
+        ray, the last one then; whether anything blocks it. origin, direction: (R, 3).
     """
-    side, start, onward = _mirrored(scene, cells, origin, direction)
-    first, beyond = onward, np.zeros_like(onward)
-    second, third = np.full((2, len(side)), OPEN, np.uint16)
-    own = np.flatnonzero(side < DARK)
-    second[own], start, beyond[own] = _mirrored(scene, cells, start[own], first[own])
+    point, mirror, blocked = found
+    hit = np.flatnonzero(blocked)
+    side, first = np.full(len(point), OPEN, np.uint16), np.zeros((len(point), 3), np.float32)
+    side[hit], start, first[hit] = _mirrored(scene, cells, origin[hit], direction[hit])
+    far = np.flatnonzero(mirror)
+    second, third = np.full((2, len(far)), OPEN, np.uint16)
+    beyond = np.zeros((len(far), 3), np.float32)
+    own = np.flatnonzero(side[far] < DARK)
+    begin = start[np.searchsorted(hit, far[own])]
+    second[own], begin, beyond[own] = _mirrored(scene, cells, begin, first[far[own]])
     again = second[own] < DARK
-    third[own[again]] = _mirrored(scene, cells, start[again], beyond[own[again]])[0]
-    count = np.bincount(point, minlength=points)
+    third[own[again]] = _mirrored(scene, cells, begin[again], beyond[own[again]])[0]
     shown = np.zeros(points, np.bool_)
     shown[point[mirror]] = True
-    begins = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-    directions = (on_steps(np.ascontiguousarray(d, np.float32)) for d in (direction, first, beyond))
-    return Ends(begins, shown, side, second, third, *directions)
+    begins = np.concatenate([[0], np.cumsum(np.bincount(point, minlength=points))]).astype(np.int32)
+    towards, onward, last = (on_steps(np.ascontiguousarray(d, np.float32)) for d in (direction, first, beyond))
+    return Ends(begins, shown, side, towards, onward, second, third, last)
 
 
 def _mirrored(

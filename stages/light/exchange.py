@@ -4,6 +4,7 @@ Each side knows its direct light under every environment, and where its rays end
 sparse product, of all environments at once: light = direct + what the rays bring, each by its weight.
 """
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +15,10 @@ from stages.core.frames import tangent_frame
 from stages.core.lanes import LANES
 from stages.core.parallel import compiled
 from stages.light.cells import Cells, probes
-from stages.light.ends import DARK, STEPS, Ends, from_steps
+from stages.light.ends import DARK, OPEN, STEPS, Ends, from_steps
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
-from stages.light.leaving import MOST, Around, OwnLight, Sky, make_sky, open_sky, received, reflectance
+from stages.light.leaving import MOST, Around, OwnLight, Sky, make_skies, open_sky, received, reflectance
 from stages.light.light_set import MAX_LIGHTS
 from stages.light.scene import Scene
 from stages.light.terms import Terms, between_cosines
@@ -35,15 +36,25 @@ SIDES = Terms(roughness=(1.0,), shares=(0.94, 0.06), stored=5, mirror=(1, 3), ju
 class Exchange:
     """What the S sides of an object's cells receive under L environments, before any material is known.
 
-    direct: (S, L, 3), direct light, 1 where all around is 1. ends: of all rays of the sides. weight: (R,) share of each in what
-    its side receives from the object. angle: (R,), of `Around`. sky: of the environments.
+    direct: (S, L, 3), direct light, 1 where all around is 1. ends: of all rays of the sides' lobes. weight: (R,) share of each
+    in what its side receives from the object. angle: (R,), of `Around`. lights: the environments.
     """
 
     direct: NDArray[np.float32]
     ends: Ends
     weight: NDArray[np.float32]
     angle: NDArray[np.float32]
-    sky: Sky
+    lights: tuple[Environment, ...]
+
+    @functools.cached_property
+    def skies(self) -> list[Sky]:
+        """Each environment, as gloss of the object shows it."""
+        return make_skies(self.lights)
+
+    @functools.cached_property
+    def sky(self) -> Sky:
+        """All of them after each other."""
+        return Sky(np.concatenate([sky.texels for sky in self.skies], 1), self.skies[0].first)
 
     def solved(self, material: NDArray[np.float32], bounces: int) -> OwnLight:
         """What the sides receive with a material each, of paths that meet the object up to `bounces` times before they reach a
@@ -74,39 +85,56 @@ class Between:
     exchange: Exchange
 
     @staticmethod
-    def of(scene: Scene, environments: list[Environment], seed: int) -> "Between | None":
+    def of(scene: Scene, environments: list[Environment], seed: int, bounces: int) -> "Between | None":
         """None where the object sees next to nothing of itself."""
         if scene.outermost[:, 0].all():
             return None
         cells = Cells.of(scene)
-        exchange = make_exchange(scene, cells, environments, seed)
+        exchange = make_exchange(scene, cells, environments, seed, bounces)
         lit = (exchange.direct.any((1, 2)) | (np.diff(exchange.ends.start) > 0)).sum()
         return Between(cells, exchange) if exchange.weight.sum() > LEAST * lit else None
 
 
-def make_exchange(scene: Scene, cells: Cells, environments: list[Environment], seed: int) -> Exchange:
-    """Trace what the sides of the cells receive directly, and where their rays end.
+OPENINGS = 2
+"""Rays of a side that must meet nothing for it to lie open: one may have slipped through where the surface meets itself."""
 
-    Sides that nobody sees, as the inner ones of what is closed, are left dark: only those are traced that lie open or on which
-    rays of others end.
+
+def make_exchange(scene: Scene, cells: Cells, environments: list[Environment], seed: int, bounces: int) -> Exchange:
+    """Trace what the sides of the cells receive directly, and where their rays end, for paths of up to so many bounces.
+
+    Sides that no light reaches on the way, as the inner ones of what is closed, are left dark, see `reached`.
     """
     points = cells.sides(scene)
     light = np.zeros((len(points.n), 3 * len(environments)), np.float32)
-    place, ends, weights, angles = np.full(len(points.n), -1, np.int64), [], [], []
-    new = np.flatnonzero(open_sides(scene, points))
+    place, ends, weights, angles = np.full(len(points.n), -1, np.int64), Ends.none(0), [], []
+    opened = open_sides(scene, points)
+    new = np.flatnonzero(opened)
     while len(new):
-        some = points[new]
-        light[new], found, weight, angle = _traced(scene, some, cells, environments, seed)
-        place[new] = (place >= 0).sum() + np.arange(len(new))
-        ends.append(found)
+        light[new], found, weight, angle = _traced(scene, points[new], cells, environments, seed)
+        place[new] = len(ends.mirror) + np.arange(len(new))
+        opened[new] |= np.add.reduceat(np.append(found.side == OPEN, 0), found.start[:-1]) >= OPENINGS
+        ends = Ends.cat([ends, found])
         weights.append(weight)
         angles.append(angle)
-        seen = np.zeros(1 << 16, np.bool_)
-        seen[np.concatenate([found.side, found.second, found.third])] = True
-        new = np.flatnonzero(seen[: len(place)] & (place < 0))
-    together = Ends.cat([*ends, Ends.none(1)])  # the last one stands for all that are not traced
+        new = np.flatnonzero(reached(opened, place, ends, bounces) & (place < 0))
+    together = Ends.cat([ends, Ends.none(1)])  # the last one stands for all that are not traced
     weight, angle = (np.concatenate([*parts, np.zeros(0, np.float32)])[together.numbers(place)] for parts in (weights, angles))
-    return Exchange(light.reshape(len(light), -1, 3), together[place], weight, angle, make_sky(environments))
+    return Exchange(light.reshape(len(light), -1, 3), together[place], weight, angle, tuple(environments))
+
+
+def reached(opened: NDArray[np.bool_], place: NDArray[np.int64], ends: Ends, bounces: int) -> NDArray[np.bool_]:
+    """Which of S sides paths of so many bounces may meet that begin in the open and end where a camera looks.
+
+    Both ends lie open; of N sides in between, none is farther than half of N from one of them. Args: opened: (S,) which sides
+    lie open. place: (S,) row among `ends` of those that are traced, or -1.
+    """
+    found = opened
+    for _ in range((bounces + 1) // 2):
+        rows = place[found & (place >= 0)]
+        side = ends.side[ends.numbers(rows)]
+        found = found.copy()
+        found[side[side < DARK]] = True
+    return found
 
 
 def open_sides(scene: Scene, points: GBuffer) -> NDArray[np.bool_]:
@@ -132,7 +160,7 @@ def _traced(
     whole = between_cosines(albedo.diffuse_table()[:, None], cosine)  # what an even light gives
     (weight, angle), counts = np.zeros((2, len(ends.side)), np.float32), SIDES.counts(RAYS.lobe)
     alphas = SIDES.alphas(np.arange(len(points.n)))
-    _shares(points.n, *tangent_frame(points.n), points.wo, ends.start, ends.mirror, ends.towards, alphas, counts, weight, angle)
+    _shares(points.n, *tangent_frame(points.n), points.wo, ends.start, ends.towards, alphas, counts, weight, angle)
     rows = np.repeat(np.arange(len(points.n)), np.diff(ends.start))
     weight /= np.bincount(rows, weight, len(points.n))[rows]
     weight[ends.side >= DARK] = 0
@@ -140,8 +168,8 @@ def _traced(
 
 
 @compiled
-def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight, angle):  # type: ignore[no-untyped-def]
-    """What each ray weighs in its point's E, and the solid angle that it stands for; 0 for a mirror's."""
+def _shares(n, t, b, wo, start, towards, alphas, counts, weight, angle):  # type: ignore[no-untyped-def]
+    """What each ray weighs in its point's E, and the solid angle that it stands for."""
     f32 = np.float32
     most = 1
     for p in range(len(n)):
@@ -151,8 +179,6 @@ def _shares(n, t, b, wo, start, mirror, towards, alphas, counts, weight, angle):
     density, inverse, weights = np.empty(most, f32), np.empty(most, f32), np.empty(3 * most, f32)
     for p in range(len(n)):
         count = start[p + 1] - start[p]
-        if mirror[p]:
-            count -= 1
         for i in range(count):
             ray = start[p] + i
             dx[i], dy[i], dz[i] = on_square(towards[ray, 0] * f32(1 / STEPS), towards[ray, 1] * f32(1 / STEPS))

@@ -80,10 +80,13 @@ class OwnLight(NamedTuple):
     around: Around
 
 
-def make_sky(environments: Sequence[Environment]) -> Sky:
-    """The environments as gloss of an object shows them to the object itself."""
-    levels = [np.concatenate(images, -1) for images in zip(*in_parallel(_levels, environments), strict=True)]
-    flat = [bordered(level).reshape(-1, level.shape[-1]).astype(np.float32) for level in levels]
+def make_skies(environments: Sequence[Environment]) -> list[Sky]:
+    """Each environment, as gloss of an object shows it to the object itself."""
+    return in_parallel(_sky, environments)
+
+
+def _sky(environment: Environment) -> Sky:
+    flat = [bordered(level).reshape(-1, 3).astype(np.float32) for level in _levels(environment)]
     return Sky(np.concatenate(flat), np.cumsum([0, *map(len, flat[:-1])]))
 
 
@@ -100,7 +103,7 @@ def arriving(ends: Ends, own: OwnLight, sky: Sky, part: slice) -> NDArray[np.flo
     """What the blocked rays of some points bring them: (rays, 3 L)."""
     result = np.empty((ends.start[part.stop] - ends.start[part.start], own.light.shape[1]), np.float32)
     start = ends.start[part.start : part.stop + 1]
-    _arriving(start, ends.mirror[part], ends.rays, own, sky, (albedo.table(), albedo.diffuse_table()), result)
+    _arriving(start, (*ends.rays, *ends.mirrors), own, sky, (albedo.table(), albedo.diffuse_table()), result)
     return result
 
 
@@ -111,7 +114,9 @@ def mirrored(ends: Ends, own: OwnLight, sky: Sky, part: slice, least: NDArray[np
     """
     result = np.zeros((*least.shape, own.light.shape[1]), np.float32)
     start = ends.start[part.start : part.stop + 1]
-    _mirrored(start, ends.mirror[part], ends.rays, least, own, sky, (albedo.table(), albedo.diffuse_table()), result)
+    first = np.count_nonzero(ends.mirror[: part.start])
+    rays = (*ends.rays, *ends.mirrors)
+    _mirrored(start, ends.mirror[part], rays, first, least, own, sky, (albedo.table(), albedo.diffuse_table()), result)
     return result
 
 
@@ -292,39 +297,43 @@ def _around(side, one, two, roughness, own, scratch, out):  # type: ignore[no-un
 
 
 @compiled(inline="always")
-def _mirror_there(ray, rays, rough, own, sky, tables, shown):  # type: ignore[no-untyped-def]
+def _mirror_there(ray, number, rays, rough, own, sky, tables, shown):  # type: ignore[no-untyped-def]
     """What a smooth side shows at the end of a ray: the sky along its mirror, or another side, of which the same is asked."""
-    _, second, third, _, onward, beyond = rays
-    if second[ray] == OPEN:
+    _, _, onward, second, third, beyond = rays
+    if second[number] == OPEN:
         _look_up(sky, onward[ray], rough, shown)
-    elif second[ray] == DARK or own.bounces < 2:
+    elif second[number] == DARK or own.bounces < 2:
         shown[:] = 0
     else:
-        there = second[ray]
-        if third[ray] == OPEN:
-            _look_up(sky, beyond[ray], _rougher(rough, own.material[there, 3]), shown)
-        elif third[ray] == DARK:
+        there = second[number]
+        if third[number] == OPEN:
+            _look_up(sky, beyond[number], _rougher(rough, own.material[there, 3]), shown)
+        elif third[number] == DARK:
             shown[:] = 0
         else:
-            shown[:] = own.sent[third[ray]]
-        _send(own.material[there], _cosine(onward[ray], beyond[ray]), own.before[there], tables, shown)
+            shown[:] = own.sent[third[number]]
+        _send(own.material[there], _cosine(onward[ray], beyond[number]), own.before[there], tables, shown)
 
 
 @compiled
-def _along(ray, rays, lobe, least, own, sky, tables, scratch, shown):  # type: ignore[no-untyped-def]
-    """What comes along a ray, seen by a lobe of a roughness, written to `shown`. Args: least: roughness taken at least."""
+def _along(ray, number, rays, lobe, least, own, sky, tables, scratch, shown):  # type: ignore[no-untyped-def]
+    """What comes along a ray, seen by a lobe of a roughness, written to `shown`.
+
+    Args: number: of a mirror's ray among those; -1 for one of a lobe, which shows what the side's own rays bring, or nothing.
+    least: roughness taken at least.
+    """
     f32 = np.float32
-    side, towards, onward = rays[0][ray], rays[3][ray], rays[4][ray]
+    side, towards, onward = rays[0][ray], rays[1][ray], rays[2][ray]
     if side >= DARK:
         shown[:] = 0
         return
     weight, seen = scratch
     rough = _rougher(max(own.material[side, 3], least), lobe)
-    wide = min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
-    if wide > f32(0) and not _around(side, towards, onward, rough, own, weight, seen):
+    wide = f32(1) if number < 0 else min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
+    if wide > f32(0) and not _around(side, towards, onward, rough, own, weight, seen) and number >= 0:
         wide = f32(0)
     if wide < f32(1):
-        _mirror_there(ray, rays, rough, own, sky, tables, shown)
+        _mirror_there(ray, number, rays, rough, own, sky, tables, shown)
         for c in range(len(shown)):
             shown[c] += wide * (seen[c] - shown[c])
     else:
@@ -333,21 +342,24 @@ def _along(ray, rays, lobe, least, own, sky, tables, scratch, shown):  # type: i
 
 
 @compiled
-def _arriving(start, mirror, rays, own, sky, tables, out):  # type: ignore[no-untyped-def]
+def _arriving(start, rays, own, sky, tables, out):  # type: ignore[no-untyped-def]
     """`arriving`; start begins at the first of the rays that are wanted."""
     scratch = np.empty(MOST, np.float32), np.zeros(out.shape[1], np.float32)
     for ray in range(start[0], start[-1]):
-        _along(ray, rays, np.float32(0), np.float32(SOFT), own, sky, tables, scratch, out[ray - start[0]])
+        _along(ray, -1, rays, np.float32(0), np.float32(SOFT), own, sky, tables, scratch, out[ray - start[0]])
 
 
 @compiled
-def _mirrored(start, mirror, rays, least, own, sky, tables, out):  # type: ignore[no-untyped-def]
-    """`mirrored`; start begins at the first of the points that are wanted."""
+def _mirrored(start, mirror, rays, first, least, own, sky, tables, out):  # type: ignore[no-untyped-def]
+    """`mirrored`; start begins at the first of the points that are wanted, and first is the number of its mirror's ray."""
     scratch = np.empty(MOST, np.float32), np.zeros(out.shape[2], np.float32)
+    number = first
     for p in range(len(mirror)):
         if mirror[p]:
             for k in range(least.shape[1]):
-                _along(start[p + 1] - 1, rays, least[p, k], np.float32(0), own, sky, tables, scratch, out[p, k])
+                lobe = least[p, k]
+                _along(start[p + 1] - 1, number, rays, lobe, np.float32(0), own, sky, tables, scratch, out[p, k])
+            number += 1
 
 
 @compiled

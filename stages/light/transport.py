@@ -275,7 +275,7 @@ def trace(
 
     Args:
         wanted: (P, lights), the rest is of no use; or all. cells: of the surface, where it is asked on which blocked rays end.
-        every: ask it of all rays.
+        every: ask it of all rays but the mirror's.
     """
     count = len(points.n), len(lights.environments)
     wanted = np.ones(count, np.bool_) if wanted is None else wanted
@@ -324,16 +324,18 @@ def _tile(
     for e, environment in enumerate(lights.environments):
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
     among, every = asked
-    return None if among is None else _ends(scene, among, rays, drawn, occluded | every)
+    return None if among is None else _ends(scene, among, rays, drawn, occluded, every)
 
 
-def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", asked: NDArray[np.bool_]) -> Ends:
-    """Where some of the rays of a tile's lobes and mirrors end."""
+def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", occluded: NDArray[np.bool_], every: bool) -> Ends:
+    """Where the blocked rays of a tile's lobes and mirrors end, or every one of its lobes."""
     slots = np.flatnonzero(rays.slots[:, 0] < len(rays.counts))  # the mirror's is the last one
-    ray = drawn.row[:, slots]
-    point, slot = np.nonzero((ray >= 0) & asked[ray])
+    mirror = len(slots) - 1
+    ray = drawn.row[:, slots[:mirror] if every else slots]
+    point, slot = np.nonzero((ray >= 0) & (occluded[ray] | every))
     ray = ray[point, slot]
-    return find_ends(scene, cells, len(drawn.row), point, slot == len(slots) - 1, drawn.origin[ray], drawn.direction[ray])
+    found = (point, slot == mirror, occluded[ray])
+    return find_ends(scene, cells, len(drawn.row), found, drawn.origin[ray], drawn.direction[ray])
 
 
 OUTER = 0.1

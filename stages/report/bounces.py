@@ -81,7 +81,7 @@ def measure(python: str, mesh: str, scene: Scene, lights: Sequence[Environment],
     eye = np.repeat(c2w[None, :3, 3], len(some), 0)
     rows = []
     for light in lights:
-        exchange, light_set = make_exchange(scene, cells, [light], 0), cached_light_set((light,))
+        exchange, light_set = make_exchange(scene, cells, [light], 0, bounces), cached_light_set((light,))
         transports, ends = integrate_with_ends(scene, points, light_set, QUALITY["standard"], 0, cells)
         counts, sides = Rays.plan(QUALITY["standard"], light_set, 0).counts, cells.sides(scene)
         assert ends is not None

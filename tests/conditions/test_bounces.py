@@ -89,6 +89,7 @@ def test_ends_are_stored_as_they_are(folder: Path) -> None:
     again = ends.to_arrays()
     assert all((again[name] == stored[name]).all() for name in stored)
     assert len(ends.side) == ends.start[-1] and len(stored["mirror_onward"]) == ends.mirror.sum() > 0
+    assert len(ends.second) == len(ends.third) == len(ends.beyond) == ends.mirror.sum()  # of lobes' rays no more is known
     assert ends.side.max() < len(load_npz(folder / "bounces.npz", BOUNCES)["direct"])
 
 

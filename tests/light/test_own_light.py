@@ -12,7 +12,7 @@ from stages.core.shading import KNOTS, Material, Transport, shade
 from stages.light.cells import MOST, Cells, part_of
 from stages.light.ends import Ends
 from stages.light.environment import Environment
-from stages.light.exchange import Exchange, make_exchange
+from stages.light.exchange import Exchange, make_exchange, reached
 from stages.light.gbuffer import GBuffer
 from stages.light.leaving import OwnLight, reflectance
 from stages.light.own_light import with_own_light
@@ -37,7 +37,7 @@ def corner() -> tuple[Scene, GBuffer, Environment, Cells, Exchange, Transport, E
     points, cells, lights = scenes.view_of(scene, 32), Cells.of(scene, FEW), cached_light_set((light,))
     transports, ends = integrate_with_ends(scene, points, lights, STANDARD, 0, cells)
     assert ends is not None
-    return scene, points, light, cells, make_exchange(scene, cells, [light], 0), transports[0], ends
+    return scene, points, light, cells, make_exchange(scene, cells, [light], 0, 2), transports[0], ends
 
 
 def everywhere(values: tuple[float, ...]) -> NDArray[np.float32]:
@@ -54,7 +54,7 @@ def shaded(
     """Radiance (P, 3) of a scene of one material, of direct light and with the object's own."""
     cells = Cells.of(scene, count)
     transports, ends = integrate_with_ends(scene, points, cached_light_set((light,)), STANDARD, 0, cells)
-    exchange = make_exchange(scene, cells, [light], 0)
+    exchange = make_exchange(scene, cells, [light], 0, bounces)
     own = exchange.solved(everywhere(values).repeat(2 * len(cells), 0), bounces)
     assert ends is not None
     material = Material.of(torch.from_numpy(everywhere(values).repeat(len(points.n), 0)))
@@ -124,7 +124,7 @@ def test_what_is_convex_has_no_ends() -> None:
     points, cells = scenes.view_of(scene, 16), Cells.of(scene, FEW)
     _, ends = integrate_with_ends(scene, points, cached_light_set((light,)), STANDARD, 0, cells)
     assert ends is not None and len(ends.side) == 0
-    assert make_exchange(scene, cells, [light], 0).weight.sum() < 0.01 * len(cells)
+    assert make_exchange(scene, cells, [light], 0, 2).weight.sum() < 0.01 * len(cells)
 
 
 def test_a_white_furnace_is_never_brighter_than_white() -> None:
@@ -158,10 +158,33 @@ def test_a_closed_box_with_a_slit_is_lit_through_it_alone() -> None:
     lid[:, 0] = np.where(lid[:, 0] > 0, 0.49, lid[:, 0])  # a hundredth of the lid is open
     scene = scenes.quads(*sides[:5], lid)
     cells = Cells.of(scene, FEW)
-    exchange = make_exchange(scene, cells, [scenes.even_light()], 0)
+    exchange = make_exchange(scene, cells, [scenes.even_light()], 0, 8)
     own = exchange.solved(everywhere((0.8, 0.8, 0.8, 0.9, 0.0)).repeat(2 * len(cells), 0), 8)
     inner = own.light[0::2]
     assert 0 < inner.mean() < 0.05 and np.isfinite(inner).all()
+
+
+@pytest.mark.parametrize(("bounces", "met"), ((1, 2), (2, 2), (3, 3), (4, 3), (5, 4)))
+def test_sides_that_no_light_reaches_on_the_way_are_not_traced(bounces: int, met: int) -> None:
+    """Side 0 lies open and sees side 1, which sees 0 and 2, which sees 1 and 3: light of N bounces gets half as deep."""
+    sees = ((1,), (0, 2), (1, 3), (2,))
+    side = np.concatenate(sees).astype(np.uint16)
+    start = np.cumsum([0, *map(len, sees)]).astype(np.int32)
+    pairs = np.zeros((len(side), 2), np.uint16)
+    ends = Ends(start, np.zeros(4, np.bool_), side, pairs, pairs, side[:0], side[:0], pairs[:0])
+    found = reached(np.arange(4) == 0, np.arange(4), ends, bounces)
+    assert found.tolist() == [number < met for number in range(4)]
+
+
+def test_of_what_is_all_but_closed_few_bounces_meet_little() -> None:
+    """Inside of a box that a few rays enter through a slit: two bounces meet those walls that it shows, six all."""
+    sides = [scenes.square(axis, at, -0.3, 0.3)[:: (-1 if at < 0 else 1)] for axis in range(3) for at in (-0.3, 0.3)]
+    sides[5][:, 0] = np.where(sides[5][:, 0] > 0, 0.29, sides[5][:, 0])
+    scene = scenes.quads(*sides, scenes.square(2, 0.4, -0.5, 0.5))
+    cells = Cells.of(scene, FEW)
+    inner = 1 + 2 * np.flatnonzero(cells.triangle % 7 < 6)
+    few, many = (np.diff(make_exchange(scene, cells, [scenes.even_light()], 0, n).ends.start)[inner] > 0 for n in (2, 6))
+    assert 0 < few.mean() < 0.5 and many.mean() > 0.95
 
 
 def test_thin_walls_do_not_leak() -> None:
@@ -170,7 +193,7 @@ def test_thin_walls_do_not_leak() -> None:
     scene = scenes.quads(sheet, floor)
     light = Environment("above", np.concatenate([np.ones((8, 64, 3)), np.zeros((24, 64, 3))]).astype(np.float32))
     cells = Cells.of(scene, FEW)
-    exchange = make_exchange(scene, cells, [light], 0)
+    exchange = make_exchange(scene, cells, [light], 0, 1)
     own = exchange.solved(everywhere(WHITE).repeat(2 * len(cells), 0), 1)
     height = cells.sides(scene).point[:, 2]
     above, under = own.light[0::2][height[0::2] > -0.05], own.light[1::2][height[1::2] > -0.05]
@@ -182,7 +205,7 @@ def test_a_sun_in_a_cavity_does_not_sparkle() -> None:
     scene, light = scenes.box_in_corner(), scenes.single_texel_light()
     points, cells = scenes.view_of(scene, 16), Cells.of(scene, FEW)
     transports, ends = integrate_with_ends(scene, points, cached_light_set((light,)), STANDARD, 0, cells)
-    exchange = make_exchange(scene, cells, [light], 0)
+    exchange = make_exchange(scene, cells, [light], 0, 3)
     own = exchange.solved(everywhere((0.9, 0.9, 0.9, 0.1, 1.0)).repeat(2 * len(cells), 0), 3)
     assert ends is not None
     added = lit(transports[0], points, ends, own, exchange).E - transports[0].E
