@@ -8,7 +8,7 @@ from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
 from stages.prior.places import PARTS, PEELS, SHAPES, SHOWS, gathering
-from stages.prior.stuffs import KNOWN
+from stages.prior.stuffs import GENERIC, KNOWN
 from stages.prior.tokens import FOODS, PAINTED, Join
 
 
@@ -44,6 +44,10 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
         elif before and phrase.join.kind == "paint" and not (phrase.says_what or phrase.region):  # "with a satin finish"
             result[0].finish += phrase.finish
             _add(result[0].weather, phrase.weather)
+        elif before and phrase.join.kind == "paint" and before.placed and phrase.substance in PAINTED and phrase.colors:
+            before.shows = Phrase(substance=before.substance, boards=before.boards) if before.substance else before.shows
+            before.substance, before.colors = phrase.substance, phrase.colors  # "a bench, cast iron ends painted green"
+            _add(before.weather, phrase.weather)
         elif before and phrase.join.kind == "paint" and before.region and _finishes(phrase, result[0]):
             result[0].substance, result[0].colors = phrase.substance or result[0].substance, phrase.colors
             result[0].finish += phrase.finish  # "with ivory grips and a nickel finish"
@@ -82,6 +86,10 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             _add(worn.weather, phrase.weather or [WEARS[phrase.where]])  # "..., steel joints, some scratches"
         elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
             _describe(before, phrase)
+        elif number == 1 and before and _restates(before, phrase, after):
+            before.substance, before.colors = phrase.substance, phrase.colors or before.colors
+            before.finish += phrase.finish
+            _add(before.weather, phrase.weather)
         elif len(result) > 1 and _again(result[0], phrase):
             result[0].finish += phrase.finish
             _add(result[0].weather, phrase.weather)
@@ -106,6 +114,23 @@ def _again(whole: Phrase, phrase: Phrase) -> bool:
     made = _made(whole)
     plain = bool(phrase.substance) and not (phrase.colors or phrase.region or phrase.thing or phrase.part)
     return plain and phrase.join.kind == "comma" and bool(made) and KNOWN[phrase.substance][0].look == KNOWN[made][0].look
+
+
+def _restates(whole: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
+    """Whether a phrase after a comma says more exactly what the whole is of: "a leather helmet, cracked tan leather"; "a plush
+    rabbit, grey fur"."""
+    plain = bool(phrase.substance and whole.substance) and not (phrase.region or phrase.thing or phrase.part or whole.region)
+    if not plain or phrase.join.kind != "comma" or gathering(phrase.substance) or phrase.coats or whole.coats:
+        return False
+    if after and after.join.kind == "and" and after.substance and not after.region:
+        return False  # "a chessboard, maple and walnut"
+    one, other = KNOWN[whole.substance][0], KNOWN[phrase.substance][0]
+    generic = whole.substance in (*GENERIC, *SOFT) and (one.family == other.family or {one.family, other.family} <= PELTS)
+    return one.look == other.look or generic
+
+
+SOFT, PELTS = ("plush", "tweed", "knit", "knitted", "knitwear", "glass", "fur"), {"fabric", "organic"}
+"""Stuffs of which another name says more, and families of what is soft."""
 
 
 def _made(whole: Phrase) -> str:

@@ -89,6 +89,10 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
             return None
         if following.kind == "part":  # "leather-wrapped grip"
             return None
+        last = now.join.kind in ("comma", "and") and following.kind in ("comma", "end", "join")
+        if last and now.says_what and not now.region:
+            now.join = Join(token.value)  # "a copper pot, tin lined"
+            return None
         return Join(token.value, True) if now.says_what and not now.animal else None
     if token.kind == "half":
         return Join("half")
@@ -124,8 +128,9 @@ PEELING = {"chipped": "chipped", "peel": "peeling", "flaking": "flaking"}
 
 def _stands_for_itself(token: Token, now: Phrase, following: Token, article: str) -> bool:
     """Whether what may be a part is the thing itself: "a helmet in olive drab", "a green door with a brass handle"."""
-    bare = not now.says_what or (article == "a" and not (now.substance or now.thing))
-    return token.kind == "part" and token.text in OBJECTS and bare and following.text not in (",", ":", "", "and")
+    bare = not now.says_what or (article == "a" and not (now.thing or (now.substance and following.kind != "comma")))
+    ends = ("and",) if article == "a" else (",", ":", "", "and")  # "a helmet, brushed steel", but "hat, coat and boots"
+    return token.kind == "part" and token.text in OBJECTS and bare and following.text not in ends
 
 
 def _is_painted(token: Token, phrases: list[Phrase]) -> bool:
@@ -153,9 +158,13 @@ def _begins(token: Token, now: Phrase) -> bool:
 
 
 def _dresses(after: Sequence[Token]) -> bool:
-    """Whether what follows is worn, and has a colour or stuff of its own."""
+    """Whether what follows is worn, or holds it, and has a colour or stuff of its own."""
     run = list(takewhile(lambda token: token.kind not in ("join", "comma", "half", "postfix"), after))
-    return any(token.kind == "part" and token.text in CLOTHES for token in run) and len(run) > 1
+    return any(token.kind == "part" and token.text in (*CLOTHES, *HOLDERS) for token in run) and len(run) > 1
+
+
+HOLDERS = ("frame", "frames", "casing", "case", "housing", "stand", "mount", "enclosure", "scabbard", "sheath")
+"""Parts in which another is: "a mirror in a brass frame"."""
 
 
 def _is_of(now: Phrase, yarn: str) -> bool:

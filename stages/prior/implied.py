@@ -6,7 +6,7 @@ from itertools import pairwise
 from stages.prior.colors import CHANGES
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, is_hue
-from stages.prior.places import GATHERS, HEADED, PARTS, SHAPES, Region, gathering
+from stages.prior.places import GATHERS, HEADED, OWN, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import ROOFS
 from stages.prior.tokens import Join, singulars
 
@@ -101,20 +101,11 @@ def _stuffs(phrases: list[Phrase]) -> None:
     """Parts that are of the same stuff on all things; of what roofs are laid."""
     for phrase in phrases:
         part = phrase.where.split(" ")[-1]
-        if part in USUAL and not phrase.says_what:
-            phrase.substance, phrase.colors = USUAL[part][0], list(USUAL[part][1])
+        if part in OWN and not phrase.says_what:
+            phrase.substance, phrase.colors = OWN[part][0], list(OWN[part][1])
         if phrase.where.endswith("roof"):
             phrase.substance = ROOFS.get(phrase.substance, phrase.substance)
 
-
-USUAL = {
-    **dict.fromkeys(("tyres", "tires", "tyre", "tire"), ("rubber", ["black"])),
-    **dict.fromkeys(("stand", "tripod"), ("black iron", [])),
-    **dict.fromkeys(("windows", "windshield", "windscreen", "lens", "lenses"), ("glass", [])),
-    **dict.fromkeys(("cushion", "cushions", "pillow", "pillows", "sail", "sails", "curtains"), ("fabric", ["cream"])),
-    "jeans": ("denim", []), **dict.fromkeys(("pages", "page edges"), ("paper", ["cream"])),
-}  # fmt: skip
-"""Parts that are of the same stuff on all things, where none is said: its name and colours."""
 
 SKINS = frozenset(["skin", "hide", "scales", "feathers", "fur"])
 """What is all that one sees of a beast that has it."""

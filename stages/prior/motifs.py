@@ -213,7 +213,7 @@ def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
             first.region, first.where = Region("left", 0.5), "half"
         if number == 0 and _both_of(first, second):
             first.substance = second.substance
-        if not first.color_only or first.region or second.join.kind not in ("and", "comma", "fade", "half"):
+        if not first.color_only or first.region or first.part or second.join.kind not in ("and", "comma", "fade", "half"):
             continue
         second.finish = second.finish or list(first.finish)
         first.thing = first.thing or ("" if second.where in PARTS else second.thing)

@@ -8,7 +8,7 @@ from stages.prior.grammar import split
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
 from stages.prior.places import CLOTHES, DETAILS, PARTS, PARTS_OF, PEELS, PERSONS, SHAPES, Region, gathering
-from stages.prior.stuffs import KNOWN
+from stages.prior.stuffs import GENERIC, KNOWN
 from stages.prior.tokens import Join
 
 Order = tuple[Phrase, list[Phrase]]
@@ -43,7 +43,7 @@ def _stands(first: Phrase, second: Phrase) -> bool:
 
 def _family_made(phrase: Phrase) -> str:
     """The family of a thing's stuff, as it is said or usual."""
-    stuff = phrase.substance or split(OBJECTS[phrase.thing].made)[0].substance
+    stuff = phrase.substance or (split(OBJECTS[phrase.thing].made)[0].substance if phrase.thing else "")
     return family(stuff) if stuff else ""
 
 
@@ -110,6 +110,14 @@ def _is_all(phrase: Phrase) -> bool:
     return phrase.region is not None and phrase.region.kind == "all"
 
 
+def _flanked(first: Phrase, over: list[Phrase]) -> Order:
+    """Sides are those of what else is said what it is of: "a toaster, mint enamel, chrome sides"."""
+    if first.says_stuff and not first.region:
+        sides = ("sides", "on the sides")
+        over = [replace(p, region=Region("sides", 0.3)) if p.where in sides else p for p in over]
+    return first, over
+
+
 def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     """The body, where one is spoken of, is the base, and what was named first lies on top of it."""
     whole = [_is_all(p) and p.says_what and not gathering(p.substance) for p in over]
@@ -122,7 +130,7 @@ def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     if body.color_only and (first.substance or first.unknown) and not (first.colors or first.region):
         return replace(first, colors=body.colors), others  # "a lacquer bowl, red inside, black outside"
     alone = bool(first.thing) and not (first.substance or first.colors or first.unknown)
-    if alone:
+    if alone or (first.substance in GENERIC and body.substance and family(first.substance) == family(body.substance)):
         return replace(body, thing=body.thing or first.thing, weather=[*first.weather, *body.weather]), others
     if not (first.region or gathering(first.substance) or first.substance in ROOFING):
         first = replace(first, region=Region("above", 0.4))
@@ -299,7 +307,7 @@ def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
 
 
 STEPS = (
-    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _of_body, _told_after, _either_side, _bared, _smaller_last,
-    _dirt_last, _edges_apart,
+    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _flanked, _of_body, _told_after, _either_side, _bared,
+    _smaller_last, _dirt_last, _edges_apart,
 )  # fmt: skip
 """What orders phrases, one after the other."""

@@ -61,50 +61,26 @@ WORN = CLOTHES | frozenset([
 """Parts that are things of their own unless another thing has them: "an orc with brown boots"."""
 
 
-def _of_things(*entries: tuple[str, dict[str, Region]]) -> dict[str, dict[str, Region]]:
-    return {thing: places for text, places in entries for thing in words(text)}
+def _of_things() -> dict[str, dict[str, Region]]:
+    """The rows of parts_of.tsv: thing → part → where it lies."""
+    found: dict[str, dict[str, Region]] = {}
+    for things, *row, parts in rows("parts_of.tsv"):
+        for thing in words(things):
+            found.setdefault(thing, {}).update(dict.fromkeys(words(parts), _region(*row)))
+    return found
 
 
-_LACES = Region("up", 0.15)
-PARTS_OF = _of_things(
-    ("table, desk, bench, stool, chair, nightstand, dresser, cabinet, sideboard",
-     {"top": Region("above", 0.12), "legs": Region("below", 0.6), "seat": Region("up", 0.3)}),
-    ("shield, kite shield, round shield, tower shield, buckler, door, mirror, window, picture frame, playing card, sign, "
-     "road sign, traffic sign, rug", {"rim": Region("edges", 0.12, 0.04), "face": Region("badge", 3.0)}),
-    ("shoe, shoes, sneaker, sneakers, boot, boots, trainers, running shoe, running shoes, hiking boot, hiking boots",
-     {"laces": _LACES, "shoelaces": _LACES}),
-    ("penguin, emperor penguin, king penguin, teddy bear, teddy, owl, robin, snowman, gnome, robot, doll, action figure, "
-     "squirrel, meerkat, kangaroo, hamster, plush toy", {"belly": Region("front", 0.3)}),
-    ("guitar, acoustic guitar, electric guitar, violin, cello, ukulele, banjo, lute",
-     {"top": Region("badge", 3.0), "back": Region("back", 0.3)}),
-    ("lamp, floor lamp, table lamp, desk lamp, street lamp, lamp post",
-     {**dict.fromkeys(("stem", "arm", "pole", "stand"), Region("below", 0.7)), "base": Region("below", 0.15),
-     "shade": Region("above", 0.35)}),
-    ("container, cargo container, shipping container, robot, mech, spaceship, locker, fridge, spacecraft, gas pump",
-     dict.fromkeys(("panel", "panels"), PARTS["body"])),
-    ("armchair, sofa, couch, settee, ottoman, lounge chair", {"upholstery": PARTS["body"], "cushions": Region("up", 0.45),
-      "frame": Region("below", 0.25)}),
-    ("house, cottage, stone cottage, building, villa, church, chapel, shop, cabin, hut, barn, townhouse",
-     {"door": Region("badge", 0.25), "doors": Region("badge", 0.25)}),
-    ("mushroom, toadstool, fly agaric, fly agaric mushroom, mushroom house, toadstool house",
-     {"cap": Region("above", 0.5), "stem": Region("below", 0.55)}),
-    ("staff, wizard staff, wand, sceptre, scepter, lighthouse, obelisk", {"top": Region("above", 0.14)}),
-    ("handbag, purse, shoulder bag, clutch",
-     dict.fromkeys(("chain", "strap", "handle", "handles"), Region("above", 0.25))),
-    ("mug, cup, bottle, tumbler, flask", dict.fromkeys(("sleeve", "sleeves"), Region("middle", 0.5))),
-    ("plate, saucer, platter, dish, tray, coin", {"rim": Region("edges", 0.15, 0.04)}),
-    ("lantern, street lamp, torch lamp", {"glass": Region("middle", 0.5), "handle": Region("above", 0.15)}),
-    ("cannon, howitzer, carronade, mortar", dict.fromkeys(("carriage", "wheels"), Region("below", 0.45))),
-    ("apple, red apple, green apple, pear, pumpkin, cherry, cherries, tomato, orange, lemon, peach, plum, strawberry, melon, "
-     "pepper, pineapple", {**dict.fromkeys(("stem", "stalk"), Region("above", 0.08)),
-                   **dict.fromkeys(("leaf", "leaves", "crown"), Region("above", 0.25))}),
-    ("drum, war drum, snare drum, bongo, tambourine", {"top": Region("up", 0.3)}),
-    ("car, sports car, race car, pickup truck, truck, van, bus, taxi, tram, train",
-     {"roof": Region("above", 0.2), **dict.fromkeys(("wheels", "rims", "hubcaps", "alloys"), Region("below", 0.25)),
-      "bonnet": Region("front", 0.3),
-      "hood": Region("front", 0.3)}),
-)  # fmt: skip
+PARTS_OF = _of_things()
 """Things whose parts lie elsewhere than those of others."""
+
+MADE = {(part, on): stuff for stuff, on, _, parts in rows("parts_made.tsv") for part in words(parts)}
+"""What parts are made of, by their name and what they are on: "soft", "hard" or anything."""
+
+OWN = {
+    part: (stuff, [own] if own != "own" else [])
+    for stuff, _, own, parts in rows("parts_made.tsv") if own for part in words(parts)
+}  # fmt: skip
+"""Parts that are of the same stuff on all things, and its colours where none is said."""
 
 SHAPES = _places("shape")
 """Patterns in which one thing lies on another."""

@@ -26,7 +26,6 @@ from stages.prior.order import ROOFING, in_its_places, ordered
 from stages.prior.phrases import Phrase, is_hue
 from stages.prior.places import (
     ANIMALS,
-    CLOTHES,
     CORRODES,
     DETAILS,
     FADE,
@@ -34,6 +33,7 @@ from stages.prior.places import (
     GATHERS,
     JOINED,
     LAYERED,
+    MADE,
     PARTS,
     PEELED,
     PEELS,
@@ -179,8 +179,9 @@ class Reading:
             masks = (part,) if whole and not (strands(phrase) or phrase.where in SHAPES) else (part, mask)
             return [Layer(coat, masks, LAYERED.get(coat.look, 0.0)), *self._weather(phrase, masks, beneath)]
         if phrase.join.kind == "fade":
-            downwards = bool(phrase.region) and mask.kind == "below"
-            mask = replace(FADE.mask(phrase.where), invert=downwards)
+            aside = bool(phrase.region) and mask.kind in ("front", "back", "left", "right")
+            faded = replace(mask, size=FADE.size, wear=1.0) if aside else FADE.mask(phrase.where)
+            mask = replace(faded, invert=bool(phrase.region) and mask.kind == "below")
         return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,), beneath)]
 
     def _more(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
@@ -242,15 +243,17 @@ class Reading:
             return replace(coal, said=f"charred {phrase.substance}")
         if phrase.substance:
             usual = split(made)[0] if made else Phrase()
-            kin = phrase.substance in GENERIC and bool(usual.substance) and _family(usual) == _family(phrase) != "stone"
-            if not phrase.colors and (kin or usual.substance == phrase.substance):  # "a plastic traffic cone"
+            if not phrase.colors and _kin(phrase, usual):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
             gaudy = {**dict.fromkeys(WOODEN, "painted wood"), **dict.fromkeys(PLAIN_METALS, "painted metal")}
             named = gaudy.get(phrase.substance, phrase.substance) if _gaudy(phrase) else phrase.substance
             if CORRODES.get(KNOWN[named][0].look) == "verdigris" and _greenish(phrase):
                 named, phrase = "verdigris", replace(phrase, colors=[])  # "copper gone green"
             return self._of(stuff(named, any(map(is_hue, phrase.colors))), phrase)
-        if made:
+        of_part = _stuff_of_part(phrase, beneath)
+        if of_part:
+            return self._of(stuff(of_part, True), phrase)
+        if made and not (phrase.colors and beneath is not None and _solid(split(made)[0])):
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
             inner.weather, inner.region, inner.where = phrase.weather, None, ""
@@ -260,14 +263,9 @@ class Reading:
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
         if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
-        part = phrase.where.split(" ")[-1]
-        worn = beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal", "ice")
-        of_part = next((name for name, parts in (OF_STUFF | (WORN_OF if worn else {})).items() if part in parts), "")
-        if phrase.colors and of_part:
-            return self._of(stuff(of_part, True), phrase)
         if beneath is not None and phrase.colors:  # of the same stuff
-            kind = phrase.region.kind if phrase.region else JOINED.get(phrase.join.kind, JOINED["with"]).kind
-            raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone")
+            kind = self._region(phrase).kind
+            raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone") and beneath.look not in ("straw", "wicker")
             look = "paint" if beneath.metallic or (raw and kind not in ("veins", "spots", "patches")) else beneath.look
             metallic = 0.0 if look == "paint" else beneath.metallic
             rough = _roughness(phrase, bool(metallic)) or (0.35 if look == "paint" else beneath.roughness)
@@ -419,6 +417,29 @@ class Reading:
         return replace(coat, metres=self._metres or METRES.get(coat.look, 1.0))
 
 
+def _stuff_of_part(phrase: Phrase, beneath: Coat | None) -> str:
+    """What a part is made of of which words name the colour alone, or "". Args: beneath: what it is on, None for a whole."""
+    said = phrase.where or phrase.part or (phrase.thing if beneath is not None else "")
+    soft = beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal", "ice")
+    hard = beneath is not None and _family_of(beneath.look) in ("metal", "wood", "stone", "ceramic", "paint", "gem")
+    sorts = ("", *(["soft"] if soft else []), *(["hard"] if hard else []))
+    found = (MADE.get((name, sort), "") for name in (said, said.split(" ")[-1]) for sort in sorts)
+    return next(filter(None, found), "") if phrase.colors else ""
+
+
+def _kin(phrase: Phrase, usual: Phrase) -> bool:
+    """Whether a thing of the stuff of a phrase has the colour that it usually has."""
+    if not usual.substance or usual.substance == phrase.substance:
+        return bool(usual.substance)
+    pelt = KNOWN[usual.substance][0].look == KNOWN[phrase.substance][0].look in PELTS
+    return _family(usual) == _family(phrase) != "stone" and (pelt or phrase.substance in GENERIC)
+
+
+def _solid(made: Phrase) -> bool:
+    """Whether a thing is of stone or metal, which a part of it that has its name and another colour need not be."""
+    return bool(made.substance) and KNOWN[made.substance][0].family in ("metal", "stone", "gem")
+
+
 def strands(phrase: Phrase) -> bool:
     """Whether a phrase is of something long and thin, which lies around a thing."""
     return phrase.substance.split(" ")[-1] in STRANDS
@@ -470,20 +491,8 @@ def _greenish(phrase: Phrase) -> bool:
     return green > 1.15 * red and green > 0.85 * blue
 
 
-OF_STUFF = {
-    "rubber": ("sole", "soles", "outsole", "tread", "treads", "tyre", "tyres", "tire", "tires", "sidewall", "sidewalls"),
-    "fabric": ("cushion", "cushions", "upholstery", "lining", "laces", "shoelaces", "tassels", "fringe", "stitching", "sail",
-               "sails", "tie", "bowtie", "necktie"),
-    "glass": ("lens", "lenses", "window", "windows", "windshield", "windscreen", "panes", "pane", "liquid"),
-}  # fmt: skip
-"""What parts are of where words name their colour alone."""
-
-WORN_OF = {
-    "fabric": (*OF_STUFF["fabric"], *CLOTHES, "hat", "beret", "turban", "scarf", "bandana", "hood"),
-    "leather": ("boots", "shoes", "belt", "gloves", "sandals"),
-    "fur": ("beard", "moustache", "mustache", "hair", "mane"),
-}  # fmt: skip
-"""What they are of on what is neither cast, carved nor painted."""
+PELTS = ("fur", "feathers")
+"""Looks whose colour is that of the beast: a bear of faux fur is as brown as one of fur."""
 
 DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "silver", "brass", "bronze", "copper", "chrome"])
 """Metals that take colour as metals, or have their own."""

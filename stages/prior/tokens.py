@@ -87,7 +87,7 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     """Each known phrase, the longest first, and each word that none knows. Args: real: words that are no slips of the pen."""
     prompt = re.sub(r"\s[-–—]+\s|[–—]", " , ", prompt)  # "rust - a ship"
     plain = unicodedata.normalize("NFKD", prompt.lower()).encode("ascii", "ignore").decode()
-    plain = plain.replace("'s ", " ")
+    plain = re.sub(r"(?:\b([a-z]+) )?\b([a-z-]+)(?:'s|(?<=s)') ([a-z-]+(?: [a-z-]+)?)", _owned, plain)
     for simile, meant in SIMILES:
         plain = re.sub(simile, meant, plain)
     plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
@@ -118,7 +118,27 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     return _resolved(_indoors(_aside(_dyed(_denied(found)))))
 
 
+def _owned(found: re.Match[str]) -> str:
+    """What somebody has, without him: a frost giant's axe is no frost; but a king's crown, where a table has it, and an egg of
+    a robin are."""
+    before, owner, owned = found.groups()
+    table = _table()[0]
+    kinds = {word: table[word].kind for word in (before, owner, owned, owned.split(" ")[0]) if word in table}
+    named = {kinds.get(owned), kinds.get(owned.split(" ")[0])} & {"thing", "size"}
+    whose = kinds.get(owner, "thing") in ("thing", "size", "animal") and bool(named)
+    if f"{owner} {owned}" in table or f"{owner} {owned.split(' ')[0]}" in table or not whose:
+        return " ".join(filter(None, (before, owner, owned)))
+    return " ".join(filter(None, ("" if kinds.get(before, "") in ("substance", "thing") else before, owned)))
+
+
 ARTICLES = {"a": "a", "an": "a", "the": "the"}
+
+TURNED = (r"((?:sun-?|rain-?|smoke-?|age-?)?(?:weathered|greyed|grayed|aged|bleached|darkened|yellowed|seasoned|silvered|"
+          r"smoked|tarnished|patinated|oxidi[sz]ed|mellowed|gone|turned|discolou?red|worn|faded|browned|stained|burnished|rubbed|smooth))")
+HUES = "|".join(COMMON)
+HANDS = ("rain|sun|sunlight|age|time|years|use|decades|centuries|weather|wind|sea|salt air|handling|touch|hands|wear|traffic|"
+         "fire|generations|elements|heat|washing|feet|footsteps|sweat")
+"""Words of what becomes of a stuff, the colours that it may take, and who does it."""
 
 NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on )"
 SIMILES = (
@@ -160,6 +180,10 @@ SIMILES = (
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
     (r"\b([a-z]+) and ([a-z]+) marbled ([a-z]+(?: [a-z]+)?)(?=$|[,.;]| with | and )", r"\1 \3 swirled with \2"),
     (r"\b([a-z]+) and ([a-z]+) marbled\b", r"\1 and \2 swirled"),
+    (rf"\b{TURNED} to (?:an? )?(?=(?:[a-z]+ )?(?:{HUES})\b)", ""),
+    (rf"\b{TURNED} (?:by|with|from|in|through) (?:the |many )?(?:{HANDS})(?: and (?:the )?(?:{HANDS}))?\b", r"\1"),
+    (rf"\b(?:by|from|through) (?:the |many |years of )?(?:{HANDS})\b", ""),
+    (r"\b(copper|brass|bronze)((?: [a-z]+){1,2}) (?:gone|turned|going|turning) (green|turquoise|teal)\b", r"\3 \1\2"),
     (r"\b(?:8|number eight)[ -]?ball\b", "eight ball"),
 )
 """What says in a roundabout way what an adjective says."""
@@ -254,12 +278,17 @@ def _longest(heard: list[str], at: int) -> tuple[Token | None, int]:
     table, longest = _table()
     for length in range(min(longest, len(heard) - at), 0, -1):
         *before, last = heard[at : at + length]
-        for spelling in (last, last.replace("-", " "), *singulars(last), f"{last}s", *plain_forms(last)):
+        plain = plain_forms(last)
+        for spelling in (last, last.replace("-", " "), *singulars(last), f"{last}s", *plain):
             text = " ".join([*before, spelling])
             for known in (text, text.replace("-", " "), text.replace("-", "")):
-                if known in table:
+                if known in table and (spelling not in plain or table[known].kind in COMPARED):
                     return table[known], length
     return None, 1
+
+
+COMPARED = ("color", "finish", "weather", "size", "degree")
+"""Kinds of words that have a comparative: a pitcher is not more pitch."""
 
 
 def plain_forms(word: str) -> list[str]:
@@ -287,8 +316,8 @@ def _respelt(word: str, explained: Container[str], real: Container[str]) -> list
 
 
 def _derived(word: str, slip: str) -> bool:
-    """Whether a word is no slip but made of another: what was done to a thing, "honed"; what it is like, "glassy"."""
-    return (word.endswith("ed") and not slip.endswith("ed")) or word == f"{slip}y"
+    """Whether a word is no slip but made of another: what was done to a thing, "honed"; what it is like, "glassy", "platen"."""
+    return word.startswith(slip) or (word.endswith("ed") and not slip.endswith("ed")) or word == f"{slip}y"
 
 
 LEAST_LETTERS = 6
@@ -325,7 +354,12 @@ def _explained(word: str, explained: Mapping[str, Sequence[str]]) -> list[Token]
 def singulars(word: str) -> list[str]:
     """What a word may be the plural of."""
     endings = (("ies", "y"), ("ves", "f"), ("ves", "fe"), ("es", ""), ("s", ""))
-    return [word.removesuffix(end) + instead for end, instead in endings if word.endswith(end) and len(word) > len(end) + 2]
+    cut = [(word.removesuffix(e), e, instead) for e, instead in endings if word.endswith(e) and len(word) > len(e) + 2]
+    return [stem + instead for stem, end, instead in cut if end != "es" or stem.endswith(HISSING)]  # "tines" are no tins
+
+
+HISSING = ("s", "x", "z", "ch", "sh", "o", "ss")
+"""What stems end with whose plural ends in -es."""
 
 
 PLACED = words("near, near the, near its, towards the, toward the, on, on the, at, at the, to the, in the, around, "
@@ -403,7 +437,9 @@ FOODS = frozenset(["bread", "cheese", "chocolate", "salt", "meat", "honeycomb", 
 """Looks of what is eaten."""
 
 HELD = FOODS | {"grass", "sand", "fine sand", "soil", "coal", "charcoal", "snow", "ice", "ash", "dust", "gravel", "leaves",
-                "bark", "newspaper", "oil", "seashell"}  # fmt: skip
+                "bark", "newspaper", "oil", "seashell", "jam", "ink", "water", "coffee beans", "acid", "rice", "red wine",
+                "sugar", "peanut butter", "marmalade", "soy sauce", "mayonnaise", "yogurt", "engine oil",
+                "motor oil"}  # fmt: skip
 """Looks of what things of other stuffs are for: "a plastic lawn chair", "a steel oil drum"."""
 
 

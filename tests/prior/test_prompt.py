@@ -99,6 +99,8 @@ def test_prompts_of_every_form_are_understood_as_they_were_judged(read) -> None:
      ("goldleaf", "gold leaf"), ("steelplate", "steel plate"), ("brassware", "brass"), ("Eichenholztisch", "oak table"),
      ("red brick, 4k, pbr, unreal engine 5", "red brick"),
      ("steel visible under chipped blue paint", "blue paint chipped to steel"),
+     ("a frost giant's axe", "an axe"), ("a wok of carbon steel seasoned to black", "a black carbon steel wok"),
+     ("a leather helmet, brown leather", "a brown leather helmet"), ("an oak toy, worn by years of use", "a worn oak toy"),
      ("matte, dark red paint", "matte dark red paint"), ("an iron radiator painted cream", "cream painted iron radiator")],
 )  # fmt: skip
 def test_one_thing_said_in_two_ways(read, prompt: str, same: str) -> None:  # type: ignore[no-untyped-def]
@@ -167,6 +169,24 @@ def test_what_is_smaller_lies_on_what_is_larger(read) -> None:  # type: ignore[n
     one, other = (read(f"a steel sword with {parts}") for parts in ("a brass pommel and an oak grip",
     "an oak grip and a brass pommel"))
     assert [coat.look for coat in one.coats] == [coat.look for coat in other.coats] == ["steel", "oak", "brass"]
+
+
+@pytest.mark.parametrize("prompt", ["a ceramic pitcher", "a silver fork with tines", "a green nylon bomber jacket"])
+def test_words_that_only_look_like_a_stuff_are_none(read, prompt: str) -> None:  # type: ignore[no-untyped-def]
+    """No pitch, tin or bomb."""
+    assert [coat.look for coat in read(prompt).coats][1:] == []
+    assert read(prompt).base.look == read(" ".join(prompt.split(" ")[:-1])).base.look or "fork" in prompt
+
+
+@pytest.mark.parametrize(
+    ("prompt", "looks"),
+    [("an accordion with white keys", "plastic"), ("a fire extinguisher with a black hose", "rubber"),
+     ("a steel helmet with a red plume", "feathers"), ("an iron box with a brown strap", "leather"),
+     ("an orc with green skin and white tusks", "bone"),
+     ("a blue hat, yellow ribbon", "linen"), ("a toy train of oak with a blue chimney", "paint")],
+)  # fmt: skip
+def test_a_part_is_of_what_such_parts_are_of(read, prompt: str, looks: str) -> None:  # type: ignore[no-untyped-def]
+    assert read(prompt).layers[-1].coat.look == looks
 
 
 @pytest.mark.parametrize(
