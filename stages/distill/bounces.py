@@ -53,9 +53,10 @@ class Bounces:
     def solved(self, material: Tensor) -> list[OwnLight]:
         """The light of an object whose cells are of these materials (C, 5), under each environment."""
         own = self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count)
-        parts = (np.split(a, len(self._exchange.skies), 1) for a in (own.light, own.before, own.sent, own.brought))
-        lights = (map(np.ascontiguousarray, part) for part in zip(*parts, strict=True))
-        return [OwnLight(own.bounces, own.material, *(a, b, c, d), own.around) for a, b, c, d in lights]
+        count = len(self._exchange.skies)
+        parts = (np.split(a, count, 1) for a in (own.light, own.before, own.sent))
+        lights = (map(np.ascontiguousarray, part) for part in zip(*parts, np.split(own.brought, count), strict=True))
+        return [OwnLight(own.bounces, own.material, a, b, c, own.start, own.around, d) for a, b, c, d in lights]
 
     def added(
         self, own: list[OwnLight], transport: Transport, place: tuple[int, int], rows: NDArray[np.int64], n: Tensor, wo: NDArray

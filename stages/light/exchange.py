@@ -18,7 +18,7 @@ from stages.light.cells import Cells, probes
 from stages.light.ends import DARK, OPEN, STEPS, Ends, from_steps
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
-from stages.light.leaving import MOST, Around, OwnLight, Sky, make_skies, open_sky, received, reflectance
+from stages.light.leaving import MOST, OwnLight, Sky, make_skies, open_sky, received, reflectance
 from stages.light.light_set import MAX_LIGHTS
 from stages.light.scene import Scene
 from stages.light.terms import Terms, between_cosines
@@ -37,7 +37,7 @@ class Exchange:
     """What the S sides of an object's cells receive under L environments, before any material is known.
 
     direct: (S, L, 3), direct light, 1 where all around is 1. ends: of all rays of the sides' lobes. weight: (R,) share of each
-    in what its side receives from the object. angle: (R,), of `Around`. lights: the environments.
+    in what its side receives from the object. angle: (R,), of `OwnLight.around`. lights: the environments.
     """
 
     direct: NDArray[np.float32]
@@ -61,15 +61,17 @@ class Exchange:
         point. Args: material: (S, 5) albedo, roughness, metallic."""
         direct = np.ascontiguousarray(self.direct.reshape(len(self.direct), -1))
         dark = np.zeros_like(direct)
-        around = Around(self.ends.start, from_steps(self.ends.towards), self.angle)
+        rays = self.ends.start, np.concatenate([from_steps(self.ends.towards), self.angle[None]])
         assert np.diff(self.ends.start).max(initial=0) <= MOST
         shown = open_sky(self.ends, self.angle, self.sky)
-        own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, shown, around)
+        seen = np.ascontiguousarray(shown.T)
+        own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, *rays, seen)
         reflected = np.tile(reflectance(material), direct.shape[1] // 3)
         for _ in range(bounces - 1):
-            more, brought = received(self.ends, self.weight, own, self.sky)
+            more, brought = received(self.ends, self.weight, own)
             light, before, sent = direct + more, own.light, reflected * own.before
-            own = OwnLight(own.bounces + 1, own.material, light, before, sent, shown + brought, around)
+            seen = np.ascontiguousarray((shown + brought).T)
+            own = OwnLight(own.bounces + 1, own.material, light, before, sent, *rays, seen)
         return own
 
 

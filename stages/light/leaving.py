@@ -53,22 +53,12 @@ class Sky(NamedTuple):
     first: NDArray[np.int64]
 
 
-class Around(NamedTuple):
-    """All around the sides of an object's cells, as their R rays meet it, side after side.
-
-    start: (S + 1,) where a side's rays begin. direction: (3, R). angle: (R,), solid angle that each stands for, steradians.
-    """
-
-    start: NDArray[np.int32]
-    direction: NDArray[np.float32]
-    angle: NDArray[np.float32]
-
-
 class OwnLight(NamedTuple):
     """Sides of cells under L environments. bounces: that a path may have made. material: (S, 5) albedo, roughness, metallic.
 
     light, before: (S, 3 L), what they receive, and that with one bounce less. sent: (S, 3 L), what they send with two less.
-    brought: (R, 3 L), what each of their rays brings, with one bounce less. around: those rays.
+    start: (S + 1,) where each side's rays begin, of R in all. around: (4, R), their directions and the solid angles that they
+    stand for, steradians. brought: (3 L, R), what each brings, with one bounce less.
     """
 
     bounces: int
@@ -76,8 +66,9 @@ class OwnLight(NamedTuple):
     light: NDArray[np.float32]
     before: NDArray[np.float32]
     sent: NDArray[np.float32]
+    start: NDArray[np.int32]
+    around: NDArray[np.float32]
     brought: NDArray[np.float32]
-    around: Around
 
 
 def make_skies(environments: Sequence[Environment]) -> list[Sky]:
@@ -99,11 +90,11 @@ def _levels(environment: Environment) -> list[NDArray[np.float32]]:
     return [octahedral(image, size, 2) for image, size in zip(images, SIZES, strict=True)]
 
 
-def arriving(ends: Ends, own: OwnLight, sky: Sky, part: slice) -> NDArray[np.float32]:
+def arriving(ends: Ends, own: OwnLight, part: slice) -> NDArray[np.float32]:
     """What the blocked rays of some points bring them: (rays, 3 L)."""
     result = np.empty((ends.start[part.stop] - ends.start[part.start], own.light.shape[1]), np.float32)
     start = ends.start[part.start : part.stop + 1]
-    _arriving(start, (*ends.rays, *ends.mirrors), own, sky, (albedo.table(), albedo.diffuse_table()), result)
+    _arriving(start, ends.rays, own, (albedo.table(), albedo.diffuse_table()), result)
     return result
 
 
@@ -120,9 +111,7 @@ def mirrored(ends: Ends, own: OwnLight, sky: Sky, part: slice, least: NDArray[np
     return result
 
 
-def received(
-    ends: Ends, weight: NDArray[np.float32], own: OwnLight, sky: Sky
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def received(ends: Ends, weight: NDArray[np.float32], own: OwnLight) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """What all rays of each of the points bring it, each of a weight: (P, 3 L), and what each ray brings, (R, 3 L)."""
     points = len(ends.mirror)
     result = np.zeros((points, own.light.shape[1]), np.float32)
@@ -130,7 +119,7 @@ def received(
 
     def task(part: slice) -> None:
         rays = slice(ends.start[part.start], ends.start[part.stop])
-        brought[rays] = arriving(ends, own, sky, part)
+        brought[rays] = arriving(ends, own, part)
         _weighted(ends.start[part.start : part.stop + 1], weight, brought[rays], result[part])
 
     in_parallel(task, slices(points, POINTS_PER_TASK))
@@ -138,7 +127,7 @@ def received(
 
 
 def open_sky(ends: Ends, angle: NDArray[np.float32], sky: Sky) -> NDArray[np.float32]:
-    """What the rays of the sides bring that end on nothing: (R, 3 L), 0 of the others. Args: angle: (R,) of `Around`."""
+    """What the rays of the sides bring that end on nothing: (R, 3 L), 0 of the others. Args: angle: (R,)."""
     result = np.zeros((len(angle), sky.texels.shape[1]), np.float32)
 
     def task(part: slice) -> None:
@@ -176,6 +165,13 @@ def _weighted(start, weight, brought, out):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
+def _clear(values):  # type: ignore[no-untyped-def]
+    """To 0, one by one: an assignment to a slice takes as long as all else."""
+    for c in range(len(values)):
+        values[c] = 0
+
+
+@compiled(inline="always")
 def _between(table, x):  # type: ignore[no-untyped-def]
     """A table over the cosines of `core.albedo`, linear. Args: x: square root of the cosine, in steps."""
     column = min(int(x), len(table) - 2)
@@ -190,7 +186,7 @@ def _look_up(sky, place, roughness, out):  # type: ignore[no-untyped-def]
     low = min(int(roughness * f32(len(ROUGHNESS) - 1)), len(ROUGHNESS) - 2)
     least, most = f32(ROUGHNESS[low] ** 4), f32(ROUGHNESS[low + 1] ** 4)  # a lobe's variance goes as its alpha squared
     between = min(max((roughness**4 - least) / (most - least), f32(0)), f32(1))
-    out[:] = 0
+    _clear(out)
     for k in range(2):
         share = between if k else f32(1) - between
         if share <= f32(0):
@@ -209,11 +205,16 @@ def _look_up(sky, place, roughness, out):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
+def _direction(place):  # type: ignore[no-untyped-def]
+    """Of two whole numbers of `Ends`."""
+    return on_square(place[0] * np.float32(1 / STEPS), place[1] * np.float32(1 / STEPS))
+
+
+@compiled(inline="always")
 def _cosine(one, two):  # type: ignore[no-untyped-def]
-    """Cosine to the normal of the mirror that turns a direction into another; both of `Ends`."""
-    x, y, z = on_square(one[0] * np.float32(1 / STEPS), one[1] * np.float32(1 / STEPS))
-    u, v, w = on_square(two[0] * np.float32(1 / STEPS), two[1] * np.float32(1 / STEPS))
-    return np.sqrt(min(max((np.float32(1) - (x * u + y * v + z * w)) * np.float32(0.5), np.float32(0)), np.float32(1)))
+    """Cosine to the normal of the mirror that turns a direction into another."""
+    along = one[0] * two[0] + one[1] * two[1] + one[2] * two[2]
+    return np.sqrt(min(max((np.float32(1) - along) * np.float32(0.5), np.float32(0)), np.float32(1)))
 
 
 @compiled(inline="always")
@@ -228,17 +229,17 @@ def _whole(table, x, roughness):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _send(material, cosine, light, tables, out):  # type: ignore[no-untyped-def]
-    """What a side sends where its gloss shows `out`, which is overwritten. Args: light: (3 L,), what it receives."""
+def _send(material, light, side, cosine, table, diffuse, out):  # type: ignore[no-untyped-def]
+    """What a side sends where its gloss shows `out`, which is overwritten. Args: light: (S, 3 L), what sides receive."""
     f32 = np.float32
-    table, diffuse = tables
-    r, m = material[3], material[4]
+    r, m = material[side, 3], material[side, 4]
     x = np.sqrt(cosine) * f32(len(diffuse) - 1)
     a, b = _whole(table, x, r)
     matt = _between(diffuse, x) * (f32(1) - m)
     for c in range(len(out)):
-        gloss = (f32(F0) * (f32(1) - m) + m * material[c % 3]) * a + b
-        out[c] = matt * material[c % 3] * light[c] + gloss * out[c]
+        color = material[side, c % 3]
+        gloss = (f32(F0) * (f32(1) - m) + m * color) * a + b
+        out[c] = matt * color * light[side, c] + gloss * out[c]
 
 
 @compiled(inline="always")
@@ -249,13 +250,13 @@ def _rougher(roughness, other):  # type: ignore[no-untyped-def]
 
 
 @fast
-def _lobe(direction, angle, d, n, a2, weight):  # type: ignore[no-untyped-def]
-    """Weights of a side's rays in its gloss towards -d, written to `weight`. Args: direction: three components, (K,) each."""
+def _lobe(around, first, last, d, n, a2, weight):  # type: ignore[no-untyped-def]
+    """Weights of a side's rays, `first` to `last`, in its gloss towards -d, written to `weight`."""
     f32 = np.float32
-    x, y, z = direction
     n_o = max(-(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), f32(MIN_COSINE))
     masking = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) / (n_o * n_o) - f32(1)))
-    for i in range(len(x)):
+    x, y, z, angle = around[0, first:last], around[1, first:last], around[2, first:last], around[3, first:last]
+    for i in range(last - first):
         cosine = n[0] * x[i] + n[1] * y[i] + n[2] * z[i]
         n_i = max(cosine, f32(MIN_COSINE))
         square = f32(2) - f32(2) * (d[0] * x[i] + d[1] * y[i] + d[2] * z[i])  # of the half vector's length
@@ -266,99 +267,121 @@ def _lobe(direction, angle, d, n, a2, weight):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _around(side, one, two, roughness, own, scratch, out):  # type: ignore[no-untyped-def]
-    """What a side's own rays show to its gloss, their mean by the lobe, written to `out`. Returns: whether there are any.
+def _around(first, last, d, onward, roughness, around, brought, weight, out):  # type: ignore[no-untyped-def]
+    """What a side's own rays, `first` to `last`, show to its gloss, their mean by the lobe, written to `out`.
 
-    Args: one, two: of `Ends`, the direction of a ray and that of its mirror image. scratch: of MOST weights.
+    Args: d, onward: direction of a ray and that of its mirror image. weight: scratch, MOST long.
+    Returns: whether there are any.
     """
     f32 = np.float32
-    start, direction, angle = own.around
-    rays = slice(start[side], start[side + 1])
-    d = on_square(one[0] * f32(1 / STEPS), one[1] * f32(1 / STEPS))
-    x, y, z = on_square(two[0] * f32(1 / STEPS), two[1] * f32(1 / STEPS))
-    x, y, z = x - d[0], y - d[1], z - d[2]
+    x, y, z = onward[0] - d[0], onward[1] - d[1], onward[2] - d[2]
     scale = f32(1) / max(math.sqrt(x * x + y * y + z * z), f32(1e-6))
     blurred = f32(ROUGHNESS[1] ** 4)  # the sky is, by so much
     a2 = max(roughness**4 - blurred, blurred)
-    weight = scratch[: rays.stop - rays.start]
-    where = direction[0, rays], direction[1, rays], direction[2, rays]
-    _lobe(where, angle[rays], d, (x * scale, y * scale, z * scale), a2, weight)
-    out[:] = 0
+    _lobe(around, first, last, d, (x * scale, y * scale, z * scale), a2, weight)
+    return _mean(weight, brought, first, last, out)
+
+
+@fast
+def _mean(weight, brought, first, last, out):  # type: ignore[no-untyped-def]
+    """Weighted mean of what some rays bring, written to `out`, 0 where no ray has a weight. Returns: whether any has."""
+    f32 = np.float32
     total = f32(0)
-    for i in range(len(weight)):
+    for i in range(last - first):
         total += weight[i]
-        for c in range(len(out)):
-            out[c] += weight[i] * own.brought[rays.start + i, c]
-    if total > f32(0):
-        scale = f32(1) / total
-        for c in range(len(out)):
-            out[c] *= scale
+    scale = f32(1) / total if total > f32(0) else f32(0)
+    for c in range(len(out)):
+        row, seen = brought[c, first:last], f32(0)
+        for i in range(last - first):
+            seen += weight[i] * row[i]
+        out[c] = scale * seen
     return total > f32(0)
 
 
 @compiled(inline="always")
-def _mirror_there(ray, number, rays, rough, own, sky, tables, shown):  # type: ignore[no-untyped-def]
-    """What a smooth side shows at the end of a ray: the sky along its mirror, or another side, of which the same is asked."""
+def _mirror_there(ray, number, rays, towards, rough, own, sky, tables, shown):  # type: ignore[no-untyped-def]
+    """What a smooth side shows at the end of a ray: the sky along its mirror, or another side, of which the same is asked.
+
+    Args: towards: direction of that mirror.
+    """
     _, _, onward, second, third, beyond = rays
     if second[number] == OPEN:
         _look_up(sky, onward[ray], rough, shown)
     elif second[number] == DARK or own.bounces < 2:
-        shown[:] = 0
+        _clear(shown)
     else:
         there = second[number]
         if third[number] == OPEN:
             _look_up(sky, beyond[number], _rougher(rough, own.material[there, 3]), shown)
         elif third[number] == DARK:
-            shown[:] = 0
+            _clear(shown)
         else:
-            shown[:] = own.sent[third[number]]
-        _send(own.material[there], _cosine(onward[ray], beyond[number]), own.before[there], tables, shown)
+            for c in range(len(shown)):
+                shown[c] = own.sent[third[number], c]
+        cosine = _cosine(towards, _direction(beyond[number]))
+        _send(own.material, own.before, there, cosine, tables[0], tables[1], shown)
 
 
 @compiled
-def _along(ray, number, rays, lobe, least, own, sky, tables, scratch, shown):  # type: ignore[no-untyped-def]
-    """What comes along a ray, seen by a lobe of a roughness, written to `shown`.
-
-    Args: number: of a mirror's ray among those; -1 for one of a lobe, which shows what the side's own rays bring, or nothing.
-    least: roughness taken at least.
-    """
+def _along(ray, number, rays, lobe, own, sky, tables, weight, seen, shown):  # type: ignore[no-untyped-def]
+    """What comes along a mirror's ray, seen by a lobe of a roughness, written to `shown`. Args: number: among those."""
     f32 = np.float32
-    side, towards, onward = rays[0][ray], rays[1][ray], rays[2][ray]
+    side = rays[0][ray]
     if side >= DARK:
-        shown[:] = 0
+        _clear(shown)
         return
-    weight, seen = scratch
-    rough = _rougher(max(own.material[side, 3], least), lobe)
-    wide = f32(1) if number < 0 else min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
-    if wide > f32(0) and not _around(side, towards, onward, rough, own, weight, seen) and number >= 0:
+    towards, onward = _direction(rays[1][ray]), _direction(rays[2][ray])
+    rough = _rougher(own.material[side, 3], lobe)
+    wide = min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
+    first, last = own.start[side], own.start[side + 1]
+    if wide > f32(0) and not _around(first, last, towards, onward, rough, own.around, own.brought, weight, seen):
         wide = f32(0)
     if wide < f32(1):
-        _mirror_there(ray, number, rays, rough, own, sky, tables, shown)
+        _mirror_there(ray, number, rays, onward, rough, own, sky, tables, shown)
         for c in range(len(shown)):
             shown[c] += wide * (seen[c] - shown[c])
     else:
-        shown[:] = seen
-    _send(own.material[side], _cosine(towards, onward), own.light[side], tables, shown)
+        for c in range(len(shown)):
+            shown[c] = seen[c]
+    _send(own.material, own.light, side, _cosine(towards, onward), tables[0], tables[1], shown)
 
 
 @compiled
-def _arriving(start, rays, own, sky, tables, out):  # type: ignore[no-untyped-def]
-    """`arriving`; start begins at the first of the rays that are wanted."""
-    scratch = np.empty(MOST, np.float32), np.zeros(out.shape[1], np.float32)
-    for ray in range(start[0], start[-1]):
-        _along(ray, -1, rays, np.float32(0), np.float32(SOFT), own, sky, tables, scratch, out[ray - start[0]])
+def _arriving(start, rays, own, tables, out):  # type: ignore[no-untyped-def]
+    """`arriving`; start begins at the first of the rays that are wanted.
+
+    What is in a tuple is taken out before the loop: within it, each time costs as much as the sums.
+    """
+    side_of, towards, onward = rays
+    table, diffuse = tables
+    begin, around, material, light, brought = own.start, own.around, own.material, own.light, own.brought
+    weight, shown = np.empty(MOST, np.float32), np.zeros(out.shape[1], np.float32)
+    for i in range(len(out)):
+        ray = start[0] + i
+        side = side_of[ray]
+        _clear(shown)
+        if side < DARK:
+            d = on_square(towards[ray, 0] * np.float32(1 / STEPS), towards[ray, 1] * np.float32(1 / STEPS))
+            m = on_square(onward[ray, 0] * np.float32(1 / STEPS), onward[ray, 1] * np.float32(1 / STEPS))
+            rough = max(material[side, 3], np.float32(SOFT))
+            _around(begin[side], begin[side + 1], d, m, rough, around, brought, weight, shown)
+            _send(material, light, side, _cosine(d, m), table, diffuse, shown)
+        for c in range(len(shown)):
+            out[i, c] = shown[c]
 
 
 @compiled
 def _mirrored(start, mirror, rays, first, least, own, sky, tables, out):  # type: ignore[no-untyped-def]
     """`mirrored`; start begins at the first of the points that are wanted, and first is the number of its mirror's ray."""
-    scratch = np.empty(MOST, np.float32), np.zeros(out.shape[2], np.float32)
-    number = first
+    channels, number = out.shape[2], first
+    weight, seen, shown = np.empty(MOST, np.float32), np.zeros(channels, np.float32), np.zeros(channels, np.float32)
     for p in range(len(mirror)):
         if mirror[p]:
             for k in range(least.shape[1]):
-                lobe = least[p, k]
-                _along(start[p + 1] - 1, number, rays, lobe, np.float32(0), own, sky, tables, scratch, out[p, k])
+                ray, lobe = start[p + 1] - 1, least[p, k]
+                _along(ray, number, rays, lobe, own, sky, tables, weight, seen, shown)
+                for c in range(channels):
+                    out[p, k, c] = shown[c]
             number += 1
 
 

@@ -65,7 +65,7 @@ def own_sums(
         opened = np.ascontiguousarray(terms.open_albedo(cosine[part], rows), np.float32)
         alphas = terms.alphas(rows)
         least = np.concatenate([np.zeros((len(rows), 1), np.float32), np.sqrt(alphas)], 1)[:, : 1 + narrow]
-        rays = (ends.start[part.start : part.stop + 1], ends.mirror[part], ends.towards, arriving(ends, own, sky, part))
+        rays = (ends.start[part.start : part.stop + 1], ends.mirror[part], ends.towards, arriving(ends, own, part))
         shown = (alphas, opened, mirrors[part], mirrored(ends, own, sky, part, least))
         _gather(*some, rays, shown, counts, where, result[part], variance[part])
 
