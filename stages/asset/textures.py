@@ -13,43 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.asset.eight_bits import normal_8bit, srgb_8bit, to_8bit
 from stages.asset.maps import Maps
 from stages.core.artifact import read_exr, write_exr
-from stages.core.color import srgb_decode
-from stages.core.images import write_png
+from stages.core.images import RUNS, write_png
 from stages.core.parallel import in_parallel
 from stages.core.texture_sets import ONE_SET, TextureSet
-
-PNG_LEVEL = 3
-"""zlib's level: within 2 % of the bytes of level 6, in two thirds of the time."""
-
-SRGB_BINS = 1 << 16
-"""Entries of the linear to sRGB table; no bin holds two borders between bytes."""
-
-
-def to_8bit(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Linear [0, 1] to bytes, rounded to nearest."""
-    return (np.clip(linear, 0, 1) * np.float32(255) + np.float32(0.5)).astype(np.uint8)
-
-
-def srgb_8bit(linear: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Linear [0, 1] to sRGB bytes, rounded to nearest: a table, then one comparison with the border it may cross."""
-    borders = srgb_decode((np.arange(256) + 0.5) / 255).astype(np.float32)  # the last one is never crossed
-    borders[255] = np.inf
-    table = np.searchsorted(borders, np.arange(SRGB_BINS) / np.float32(SRGB_BINS), side="right").astype(np.uint8)
-    byte = table[np.clip(linear * np.float32(SRGB_BINS), 0, SRGB_BINS - 1).astype(np.uint16)]
-    return byte + (linear >= borders[byte])
-
-
-def normal_8bit(normal: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Unit vectors (H, W, 3) to bytes, dithered by at most half a step so that gentle slopes do not turn into terraces.
-
-    Where nothing leans, the bytes are those that every tool takes for flat: 128, 128, 255.
-    """
-    noise = np.random.default_rng(0).random(normal.shape, np.float32)
-    byte = np.clip((normal + 1) * np.float32(127.5) + noise, 0, 255).astype(np.uint8)
-    byte[(normal[..., :2] == 0).all(-1)] = (128, 128, 255)
-    return byte
 
 
 def write_textures(folder: Path, maps: Maps, of: TextureSet = ONE_SET, grey: bool = False) -> list[str]:
@@ -64,7 +33,7 @@ def write_textures(folder: Path, maps: Maps, of: TextureSet = ONE_SET, grey: boo
 
     def write(name: str) -> None:
         if name in pngs:
-            write_png(folder / of.file(name), pngs[name](), PNG_LEVEL)
+            write_png(folder / of.file(name), pngs[name](), RUNS)
         else:
             write_exr(folder / of.file(name), exrs[name]())
 

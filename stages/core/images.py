@@ -13,18 +13,22 @@ from stages.core.errors import InputError
 TEXT_HEIGHT = 14
 """Of names in pictures, pixels."""
 
-AVERAGE = 0x40
-"""libpng's filter of all rows: each pixel less the mean of its left and upper neighbours. To try all filters on every row takes
-twice the time, and saves 0 to 2 % of the bytes of textures."""
+AVERAGE, PAETH = 0x40, 0x80
+"""libpng's filters of all rows: each pixel less the mean of its left and upper neighbours, or less the neighbour that the
+others foretell. To try all filters on every row takes twice the time, and saves 0 to 2 % of the bytes of textures."""
+
+RUNS, MATCHES = "rle", "default"
+"""What zlib looks for: the byte before, again and again, or strings of bytes that were there before. Grain repeats nothing: six
+sets of textures are 6 % smaller by runs, and written in half of the time; pictures with a background are up to 17 % larger."""
 
 
-def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
+def write_png(path: Path, pixels: NDArray, strategy: str = MATCHES) -> None:
     """Write a PNG atomically, of 8 bits, or of 16 where the pixels have them.
 
     Args:
         pixels: (H, W), (H, W, 3) or (H, W, 4); uint8, uint16, or float in [0, 1] already encoded as the file wants it
         (rounded to nearest, clamped). A fourth channel is stored as it is, and the others are not scaled by it.
-        compression: zlib's level, 0 to 9.
+        strategy: MATCHES, or RUNS for textures.
     """
     if pixels.dtype not in (np.uint8, np.uint16):
         pixels = (np.clip(pixels, 0.0, 1.0) * 255.0 + 0.5).astype(np.uint8)
@@ -35,8 +39,8 @@ def write_png(path: Path, pixels: NDArray, compression: int = 6) -> None:
         assert output is not None, "OpenImageIO was built without PNG"
         spec = oiio.ImageSpec(width, height, count, pixels.dtype.name)
         spec["oiio:UnassociatedAlpha"] = 1
-        spec["png:compressionLevel"] = compression
-        spec["png:filter"] = AVERAGE
+        spec["compression"] = strategy
+        spec["png:filter"] = PAETH if strategy == RUNS else AVERAGE
         written = output.open(str(temporary), spec)
         written = written and output.write_image(pixels) and output.close()
         if not written:

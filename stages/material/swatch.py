@@ -17,12 +17,24 @@ SAMPLES = 1 << 15
 
 
 class Swatch(NamedTuple):
-    """albedo: (H, W, 3) linear. roughness, metallic: (H, W). height: (H, W), edges of the square."""
+    """texels: (H, W, 6), see `COLUMNS`, heights in edges of the square."""
 
-    albedo: Array
-    roughness: Array
-    metallic: Array
-    height: Array
+    texels: Array
+
+    @property
+    def albedo(self) -> Array:
+        """(H, W, 3) linear."""
+        return self.texels[..., :3]
+
+    @property
+    def roughness(self) -> Array:
+        """(H, W)."""
+        return self.texels[..., 3]
+
+    @property
+    def height(self) -> Array:
+        """(H, W)."""
+        return self.texels[..., 5]
 
 
 def swatch(recipe: Recipe, size: int, threads: int, supersample: int = 2) -> Swatch:
@@ -44,8 +56,7 @@ def swatch(recipe: Recipe, size: int, threads: int, supersample: int = 2) -> Swa
             some = np.flatnonzero(uneven(maps.reshape(size, size, COLUMNS), known, wrap=True))
             count = SAMPLES // supersample**2
             list(pool.map(lambda k: part(some[k : k + count], supersample), range(0, len(some), count)))
-    albedo, rest = maps[:, :3].reshape(size, size, 3), maps[:, 3:].reshape(size, size, COLUMNS - 3)
-    return Swatch(albedo, rest[..., 0], rest[..., 1], rest[..., 2])
+    return Swatch(maps.reshape(size, size, COLUMNS))
 
 
 def _sampled(recipe: Recipe, size: int, texels: NDArray[np.int64], samples: int) -> Array:

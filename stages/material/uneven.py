@@ -3,6 +3,8 @@
 A recipe holds nothing finer than the texel that asks, so elsewhere one sample is the texel's mean, nearly; of the texels beside
 a border the samples fall on one side or the other. """
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,9 +29,12 @@ def uneven(maps: NDArray[np.float32], known: NDArray[np.bool_], wrap: bool = Fal
     """
     apart = np.zeros(known.shape, np.float32)
     _differ(maps, known, wrap, apart)
-    some = apart[known]
-    least = np.partition(some, int((1 - MOST) * len(some)))[int((1 - MOST) * len(some))] if len(some) else 0.0
-    result: NDArray[np.bool_] = apart > max(STEP, float(least))
+    result: NDArray[np.bool_] = apart > STEP
+    count = np.count_nonzero(known)
+    kept = int((1 - MOST) * count)
+    if np.count_nonzero(result) > count - kept:
+        some = apart[known]
+        result = apart > max(STEP, float(np.partition(some, kept)[kept]))
     return result
 
 
@@ -37,20 +42,33 @@ def uneven(maps: NDArray[np.float32], known: NDArray[np.bool_], wrap: bool = Fal
 def _differ(maps, known, wrap, apart):  # type: ignore[no-untyped-def]
     """The largest difference of each texel from its neighbours."""
     height, width = known.shape
+    rows = np.empty((2, 5, width), np.float32)  # this one and the next, as differences are counted
+    _row(maps[0], rows[0])
     for i in range(height):
-        for j in range(width):
-            for down in range(2):
-                k, m = i + down, j + 1 - down
-                if wrap:
-                    k, m = k % height, m % width
-                if k < height and m < width and known[i, j] and known[k, m]:
-                    step = _difference(maps[i, j], maps[k, m])
-                    apart[i, j], apart[k, m] = max(apart[i, j], step), max(apart[k, m], step)
+        below = i + 1 if i + 1 < height else 0
+        here, there = rows[i % 2], rows[1 - i % 2]
+        _row(maps[below], there)
+        _step(here[:, 1:], here[:, :-1], known[i, 1:], known[i, :-1], apart[i, 1:], apart[i, :-1])
+        if wrap:
+            _step(here[:, :1], here[:, -1:], known[i, :1], known[i, -1:], apart[i, :1], apart[i, -1:])
+        if below or wrap:
+            _step(here, there, known[i], known[below], apart[i], apart[below])
 
 
 @compiled
-def _difference(a, b):  # type: ignore[no-untyped-def]
-    step = max(abs(a[3] - b[3]), abs(a[4] - b[4]))
-    for c in range(3):
-        step = max(step, abs(np.sqrt(max(a[c], np.float32(0))) - np.sqrt(max(b[c], np.float32(0)))))
-    return step
+def _row(texels, row):  # type: ignore[no-untyped-def]
+    for j in range(len(texels)):
+        for c in range(3):
+            row[c, j] = math.sqrt(max(texels[j, c], np.float32(0)))
+        row[3, j], row[4, j] = texels[j, 3], texels[j, 4]
+
+
+@compiled
+def _step(a, b, a_known, b_known, a_apart, b_apart):  # type: ignore[no-untyped-def]
+    """Raise how far apart some texels and their neighbours are."""
+    for j in range(a.shape[1]):
+        if a_known[j] and b_known[j]:
+            step = np.float32(0)
+            for c in range(5):
+                step = max(step, abs(a[c, j] - b[c, j]))
+            a_apart[j], b_apart[j] = max(a_apart[j], step), max(b_apart[j], step)

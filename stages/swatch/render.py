@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter
 
 from stages.asset.maps import Maps
 from stages.core.color import srgb_encode
@@ -18,6 +18,7 @@ from stages.light.lookup import REPEAT, look_up
 from stages.light.normal_maps import NormalMap, NormalMaps
 from stages.light.scene import Scene
 from stages.light.transport import Quality, cached_light_set
+from stages.swatch.kernels import shrunk
 
 LIGHTS = ("studio", "clear_sky", "interior")
 FOV_Y = np.radians(26.0)
@@ -31,16 +32,17 @@ RAYS = Quality(lobe=16, light=8, extra=False)
 FEW = Quality(lobe=2, light=1, extra=False, smooth=False)
 """Enough for the mean of a picture."""
 
-SEGMENTS = 96
+SEGMENTS = 64
 AROUND = 2
 """How often the tile goes around the sphere."""
 
 
 class Thing(NamedTuple):
-    """A mesh with UVs: positions, normals (T, 3, 3), uv (T, 3, 2) v up, camera (4, 4)."""
+    """A mesh with UVs: vertices and their normals (V, 3), triangles (T, 3), uv (T, 3, 2) v up, camera (4, 4)."""
 
-    positions: NDArray[np.float32]
+    vertices: NDArray[np.float32]
     normals: NDArray[np.float32]
+    triangles: NDArray[np.int32]
     uv: NDArray[np.float32]
     c2w: NDArray[np.float64]
 
@@ -65,26 +67,14 @@ def _normals(maps: Maps) -> NDArray[np.float32]:
     return maps.normal if maps.normal is not None else np.broadcast_to(flat, maps.albedo.shape)
 
 
-def shrunk(values: NDArray[np.float32], size: int) -> NDArray[np.float32]:
-    """A square map (H, H, C) averaged over whole blocks, to `size` texels along its edge or somewhat more; then cut to it."""
-    step = max(1, len(values) // size)
-    count = len(values) // step
-    blocks = values[: count * step, : count * step].reshape(count, step, count, step, -1).mean((1, 3))
-    if count == size:
-        return blocks
-    nearest = (np.arange(size) * count) // size
-    return blocks[nearest][:, nearest]
-
-
 def _pictures(thing: Thing, lights: list, material: NDArray, normal: NDArray, size: int) -> list[NDArray[np.float32]]:
     """The thing under each light, encoded, (size, size, 3) each."""
-    vertices, triangles = thing.positions.reshape(-1, 3), np.arange(3 * len(thing.positions), dtype=np.int32).reshape(-1, 3)
     down = thing.uv * (1, -1) + (0, 1)
-    tangents = mikktspace(thing.positions, thing.normals, thing.uv)
-    bumps = NormalMaps([NormalMap(np.ascontiguousarray(normal))], np.zeros(len(triangles), np.int32), down, tangents)
-    scene = Scene(vertices, triangles, thing.normals, bumps)
+    normals, of_map = thing.normals[thing.triangles], np.zeros(len(thing.triangles), np.int32)
+    tangents = mikktspace(thing.vertices[thing.triangles], normals, thing.uv)
+    scene = Scene(thing.vertices, thing.triangles, normals, NormalMaps([NormalMap(normal)], of_map, down, tangents))
     hits = trace_view(scene, thing.c2w, float(FOV_Y), size, size)
-    cover = covered(scene, thing.c2w, size)
+    cover = covered(scene, thing.c2w, hits.mask)
     uv = np.einsum("pk,pkd->pd", hits.barycentric, down[hits.triangle])
     values = look_up(material, uv, wrap=(REPEAT, REPEAT))
     some = hits[np.arange(0, len(values), 16)]
@@ -98,10 +88,19 @@ def _pictures(thing: Thing, lights: list, material: NDArray, normal: NDArray, si
     return pictures
 
 
-def covered(scene: Scene, c2w: NDArray, size: int) -> NDArray[np.float32]:
-    """Share of each pixel that the thing fills, (size, size, 1), of two samples along each edge."""
-    fine = scene.intersect(*camera_rays(c2w, float(FOV_Y), 2 * size, 2 * size)).mask
-    return fine.reshape(size, 2, size, 2).mean((1, 3), dtype=np.float32)[..., None]
+def covered(scene: Scene, c2w: NDArray, mask: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Share of each pixel that the thing fills, (H, W, 1), of two samples along each edge where its outline runs.
+
+    Args: mask: (H, W), which pixels it fills at their centres.
+    """
+    share = mask.astype(np.float32)
+    size = len(mask)
+    row, column = np.nonzero(maximum_filter(mask, 3) & ~minimum_filter(mask, 3))
+    _, directions = camera_rays(c2w, float(FOV_Y), 2 * size, 2 * size)
+    fine = directions.reshape(size, 2, size, 2, 3)[row, :, column].reshape(-1, 3)
+    origins = np.broadcast_to(c2w[:3, 3].astype(np.float32), fine.shape)
+    share[row, column] = scene.intersect(origins, fine).mask.reshape(-1, 4).mean(1)
+    return share[..., None]
 
 
 def nearest_hit(mask: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -132,16 +131,14 @@ def _camera(eye: tuple[float, float, float]) -> NDArray[np.float64]:
     return look_at(np.array(eye), np.zeros(3), np.array([0.0, 0.0, 1.0]))
 
 
-def _grid(p: NDArray, n: NDArray, uv: NDArray) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.float32]]:
-    """Triangle corners (T, 3, …) of a grid of points, wound so that they face along n."""
-
-    def corners(values: NDArray) -> NDArray[np.float32]:
-        a, b, c, d = values[:-1, :-1], values[1:, :-1], values[1:, 1:], values[:-1, 1:]
-        both = np.stack([np.stack([a, b, c], 2), np.stack([a, c, d], 2)], 2)
-        return both.reshape(-1, 3, values.shape[-1]).astype(np.float32)
-
-    positions, normals, coordinates = corners(p), corners(n), corners(uv)
-    facing = np.cross(positions[:, 1] - positions[:, 0], positions[:, 2] - positions[:, 0])
-    if (facing * normals[:, 0]).sum() < 0:
-        positions, normals, coordinates = (v[:, ::-1].copy() for v in (positions, normals, coordinates))
-    return positions, normals, coordinates
+def _grid(p: NDArray, n: NDArray, uv: NDArray) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.int32], NDArray]:
+    """Vertices, normals, triangles and their UVs of a grid of points, wound so that they face along n."""
+    rows, columns = n.shape[:2]
+    number = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    triangles = np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], 2).reshape(-1, 3)
+    vertices, normals, coordinates = (values.reshape(rows * columns, -1).astype(np.float32) for values in (p, n, uv))
+    corners = vertices[triangles]
+    if (np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) * normals[triangles[:, 0]]).sum() < 0:
+        triangles = triangles[:, ::-1].copy()
+    return vertices, normals, triangles, coordinates[triangles]

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from stages.asset.eight_bits import to_8bit
 from stages.asset.maps import Maps
-from stages.asset.textures import PNG_LEVEL, to_8bit, write_textures
+from stages.asset.textures import write_textures
 from stages.core.artifact import (
     Provenance,
     Schema,
@@ -19,27 +20,24 @@ from stages.core.artifact import (
     sha256_file,
     write_manifest,
 )
-from stages.core.images import write_png
-from stages.core.parallel import beside, cores, in_parallel, slices
+from stages.core.images import RUNS, write_png
+from stages.core.parallel import beside, cores
 from stages.core.progress import Progress, silent
 from stages.material.directions import WHOLE
 from stages.material.library import Library, hashes
 from stages.material.masks import settled
 from stages.material.recipe import Recipe
-from stages.material.relief import gentle
 from stages.material.surface import Surface
 from stages.material.swatch import swatch
 from stages.prior.explain import HEADINGS, explained
 from stages.prior.prompt import read_prompt
 from stages.prior.vocabulary import WEIGHTS_FILE, ShippedWords
+from stages.swatch.kernels import tile_normals
 from stages.swatch.options import SwatchOptions
 from stages.swatch.render import preview
 
 SWATCH = Schema("dreammat.swatch", 1, manifest="swatch.json")
 """A folder: albedo, roughness, metallic, normal, height as .exr and .png, orm.png; preview.png; swatch.json."""
-
-BAND = 64
-"""Rows that one task leans."""
 
 SETTLED_AT = 128
 """Points along an edge of the square on which masks are settled."""
@@ -96,30 +94,14 @@ def flat(recipe: Recipe) -> Recipe:
 
 def tile(recipe: Recipe, size: int) -> Maps:
     """The maps of a settled recipe, tiling; height in edges of the square."""
-    made = swatch(recipe, size, cores())
-    material = np.concatenate([made.albedo, made.roughness[..., None], made.metallic[..., None]], 2)
-    return Maps(material, made.height, tile_normals(made.height))
-
-
-def tile_normals(height: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Tangent-space normals of a tile's height, +Y up. Args: (H, H) edges of the tile. Returns: (H, H, 3) unit."""
-    size, normal = np.float32(len(height)), np.ones((*height.shape, 3), np.float32)
-    above, below = np.roll(height, 1, 0), np.roll(height, -1, 0)
-
-    def lean(rows: slice) -> None:
-        right = (np.roll(height[rows], -1, 1) - np.roll(height[rows], 1, 1)) * (size / 2)
-        up = (above[rows] - below[rows]) * (size / 2)
-        normal[rows, :, :2] = -gentle(np.stack([right, up], -1))
-        normal[rows] /= np.linalg.norm(normal[rows], axis=-1, keepdims=True)
-
-    in_parallel(lean, slices(len(height), BAND))
-    return normal
+    texels = swatch(recipe, size, cores()).texels
+    return Maps(texels[..., :5], texels[..., 5], tile_normals(texels[..., 5]))
 
 
 def write_maps(out: Path, maps: Maps) -> list[str]:
     """Write the maps into a folder. Returns: the files' names."""
     out.mkdir(parents=True, exist_ok=True)
-    write_png(out / "height.png", height_8bit(maps), PNG_LEVEL)
+    write_png(out / "height.png", height_8bit(maps), RUNS)
     return ["height.png", *write_textures(out, maps, grey=True)]
 
 
@@ -128,5 +110,3 @@ def height_8bit(maps: Maps) -> NDArray[np.uint8]:
     assert maps.height is not None
     low, high = float(maps.height.min()), float(maps.height.max())
     return to_8bit((maps.height - low) / max(high - low, 1e-12))
-
-

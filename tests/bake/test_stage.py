@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from stages.asset.eight_bits import normal_8bit
 from stages.asset.maps import Maps
-from stages.asset.textures import normal_8bit, srgb_8bit
 from stages.bake import stage
 from stages.bake.options import BakeOptions
 from stages.bake.stage import bake
@@ -299,12 +299,6 @@ def test_unseen_surface_takes_the_colour_of_seen_surface(tmp_path: Path) -> None
     differs[512 - 171 - 4 :, 341 - 4 :] = False  # the chart and its padding
     assert not differs.any()
     np.testing.assert_allclose(hidden[chart].mean(), whole.mean(), atol=0.1)  # that of its sides
-
-
-def test_srgb_bytes_are_the_rounded_curve() -> None:
-    linear = np.concatenate([np.linspace(0, 1, 100_003), [-1, 2]]).astype("f4")
-    exact = srgb_encode(linear.astype(float)) * 255
-    assert np.abs(srgb_8bit(linear) - exact).max() <= 0.5 + 1e-4
 
 
 def test_the_report_says_what_the_asset_is(constant_asset: Path) -> None:

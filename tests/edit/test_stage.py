@@ -9,8 +9,8 @@ import pytest
 from click.testing import CliRunner
 
 from dreammat_cli.main import cli
+from stages.asset.eight_bits import srgb_8bit, to_8bit
 from stages.asset.folder import read_asset
-from stages.asset.textures import srgb_8bit, to_8bit
 from stages.bake.options import BakeOptions
 from stages.bake.stage import Subject, bake, open_folder
 from stages.core.artifact import load_npz, read_exr, read_manifest

@@ -13,8 +13,10 @@ from dreammat_cli.main import cli
 from stages.core.artifact import read_exr
 from stages.core.errors import InputError
 from stages.core.images import read_image
+from stages.material.relief import gentle
+from stages.swatch.kernels import shrunk, tile_normals
 from stages.swatch.options import SwatchOptions
-from stages.swatch.stage import make_swatch, tile_normals
+from stages.swatch.stage import make_swatch
 
 SMALL = {"size": 256, "preview_size": 32}
 
@@ -66,6 +68,19 @@ def test_normals_lean_away_from_a_slope() -> None:
     height = np.tile(np.sin(2 * np.pi * np.arange(64) / 64).astype(np.float32) / 100, (64, 1))
     normal = tile_normals(height)
     assert normal[0, 0, 0] < -0.05 and normal[0, 32, 0] > 0.05 and abs(normal[..., 1]).max() < 1e-6
+
+
+def test_normals_and_means_are_those_of_the_obvious_form() -> None:
+    rng = np.random.default_rng(0)
+    height = rng.normal(0, 0.01, (96, 96)).astype(np.float32)  # steeper than what is shown, here and there
+    slope = np.stack([np.roll(height, -1, 1) - np.roll(height, 1, 1), np.roll(height, 1, 0) - np.roll(height, -1, 0)], -1) * 48
+    leaning = np.concatenate([-gentle(slope), np.ones((96, 96, 1))], -1)
+    leaning /= np.linalg.norm(leaning, axis=-1, keepdims=True)
+    np.testing.assert_allclose(tile_normals(height), leaning, atol=3e-6)
+    maps = rng.random((96, 96, 6)).astype(np.float32)[..., :5]
+    blocks = maps[:95, :95].reshape(19, 5, 19, 5, 5).mean((1, 3))
+    np.testing.assert_allclose(shrunk(maps, 19), blocks, atol=1e-6)
+    np.testing.assert_allclose(shrunk(maps, 18), np.delete(np.delete(blocks, 18, 0), 18, 1), atol=1e-6)
 
 
 @pytest.mark.parametrize("wrong", [{"prompt": " "}, {"size": 300}, {"metres": 0.0}, {"preview_size": 1}])
