@@ -37,6 +37,8 @@ def command() -> None:
 @click.option("--env", multiple=True, metavar="NAME|FILE", help="As for `conditions`.")
 @click.option("--seed", type=click.IntRange(0, 2**31 - 2), default=DEFAULT["seed"], show_default=True,
               help="Of camera and rays.")
+@click.option("--bounces", type=click.IntRange(0, 8), default=DEFAULT["bounces"], show_default=True,
+              help="Of light between surfaces, measured beside direct light alone; 0 for none.")
 @click.option("--mitsuba", default=DEFAULT["mitsuba"], metavar="PYTHON",
               help="A Python that has the package mitsuba, for a side-by-side with it.")
 @click.option("--cycles", default=DEFAULT["cycles"], metavar="PYTHON",

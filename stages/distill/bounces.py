@@ -52,11 +52,7 @@ class Bounces:
 
     def solved(self, material: Tensor) -> list[OwnLight]:
         """The light of an object whose cells are of these materials (C, 5), under each environment."""
-        own = self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count)
-        count = len(self._exchange.skies)
-        parts = (np.split(a, count, 1) for a in (own.light, own.before, own.sent))
-        lights = (map(np.ascontiguousarray, part) for part in zip(*parts, np.split(own.brought, count), strict=True))
-        return [OwnLight(own.bounces, own.material, a, b, c, own.start, own.around, d) for a, b, c, d in lights]
+        return self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count).by_light()
 
     def added(
         self, own: list[OwnLight], transport: Transport, place: tuple[int, int], rows: NDArray[np.int64], n: Tensor, wo: NDArray

@@ -70,6 +70,13 @@ class OwnLight(NamedTuple):
     around: NDArray[np.float32]
     brought: NDArray[np.float32]
 
+    def by_light(self) -> "list[OwnLight]":
+        """The same under each environment alone."""
+        count = len(self.brought) // 3
+        parts = [map(np.ascontiguousarray, np.split(a, count, 1)) for a in (self.light, self.before, self.sent)]
+        lights = zip(*parts, np.split(self.brought, count), strict=True)
+        return [self._replace(light=a, before=b, sent=c, brought=d) for a, b, c, d in lights]
+
 
 def make_skies(environments: Sequence[Environment]) -> list[Sky]:
     """Each environment, as gloss of an object shows it to the object itself."""

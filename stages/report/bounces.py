@@ -33,8 +33,8 @@ from stages.light.lights import BUILTIN
 from stages.light.own_light import with_own_light
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, Rays, cached_light_set, integrate_with_ends
-from stages.report.conditions import write_csv
 from stages.report.renderers import NEEDS, pole_to_pole, read_arrays, write_arrays
+from stages.report.rows import write_csv
 
 SIZE = 160
 """Pixels along each side of a view."""

@@ -3,14 +3,13 @@
 One view, in which the object fills about 42 % of the pixels, is traced at every setting. Errors are those of the six
 light maps, tone-mapped by x / (1 + x), at random object pixels, against a converged result: far more rays, no smoothing,
 other seeds. That result itself is held against float64 quadrature at a few pixels. Written: conditions.csv, a line for
-each setting, environment and map; steps.csv; conditions.png; and renderers.csv where Mitsuba or Cycles is at hand.
+each setting, environment and map, then those of `stages.report.bounce_rows`, whose map is a material; steps.csv; conditions.png
+and bounces.png; and renderers.csv where Mitsuba or Cycles is at hand.
 """
 
-import csv
 import dataclasses
-import io
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from stages.asset.traced import traced_scene
 from stages.conditions.cameras import place_cameras
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import read_lights
-from stages.core.artifact import Artifact, load_npz, write_text
+from stages.core.artifact import Artifact, load_npz
 from stages.core.color import reinhard
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
@@ -36,8 +35,9 @@ from stages.light.light_set import LightSet
 from stages.light.reference import reference_transport
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, Quality, cached_light_set, integrate
-from stages.report import plots, renderers, steps
+from stages.report import bounce_rows, plots, renderers, steps
 from stages.report.options import ReportOptions
+from stages.report.rows import Row, write_csv
 
 COVERAGE = 0.42
 """Share of the view's pixels that the object fills."""
@@ -59,24 +59,6 @@ SEEDS = (7_001, 7_002)
 
 QUADRATURE_PIXELS, QUADRATURE_ROWS = 8, 1024
 """Pixels and rows of directions of the float64 quadrature."""
-
-
-@dataclass(frozen=True)
-class Row:
-    """One measurement. seconds: of the whole view and all environments. Errors in percent.
-
-    floor_percent: how far the converged result itself may be off, from its two seeds.
-    """
-
-    setting: str
-    lobe_rays: int
-    light_rays: int
-    environment: str
-    map: str
-    seconds: float
-    rmse_percent: float
-    p999_percent: float
-    floor_percent: float
 
 
 @dataclass(frozen=True)
@@ -108,11 +90,19 @@ def report_conditions(prep: Path, out: Path, options: ReportOptions, progress: P
         rows += measure_quality(subject, factor, options.seed)
     rows += ablations(subject, options.seed, lambda i: progress("settings", len(SWEEP) + i, len(SWEEP) + 4))
     progress("settings", len(SWEEP) + 4, len(SWEEP) + 4)
+    title = f"{Path(prep).stem}, {options.size}², {len(subject.points.n)} pixels"
+    if options.bounces:
+        progress("light between surfaces", 0, 1)
+        between = bounce_rows.bounce_rows(subject, options.bounces, options.seed)
+        if between:
+            plots.bounces(out / "bounces.png", between, title)
+        rows += between
+        progress("light between surfaces", 1, 1)
     write_csv(out / "conditions.csv", rows)
     progress("steps", 0, 1)
     write_csv(out / "steps.csv", steps.measure(subject.scene, subject.points, subject.lights, options.seed))
     progress("steps", 1, 1)
-    plots.frontier(out / "conditions.png", rows, f"{Path(prep).stem}, {options.size}², {len(subject.points.n)} pixels")
+    plots.frontier(out / "conditions.png", rows, title)
     others = [(name, python) for name, python in (("mitsuba", options.mitsuba), ("cycles", options.cycles)) if python]
     if others:
         progress("other renderers", 0, 1)
@@ -251,13 +241,3 @@ def mean_of(a: Transport, b: Transport) -> Transport:
 
 def rms(x: Tensor) -> float:
     return float(x.double().square().mean().sqrt())
-
-
-def write_csv(path: Path, rows: Iterable[Any]) -> None:
-    """One line a dataclass, its fields as columns."""
-    rows = list(rows)
-    stream = io.StringIO()
-    writer = csv.DictWriter(stream, [f.name for f in dataclasses.fields(rows[0])], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in dataclasses.asdict(row).items()} for row in rows)
-    write_text(path, stream.getvalue())

@@ -14,6 +14,8 @@ class ReportOptions:
     """as for `conditions`; empty for the five built-in environments"""
     seed: int = 0
     """of the camera and of the measured rays; the converged result uses others"""
+    bounces: int = 2
+    """of light between the object's surfaces, which is measured too; 0 for direct light alone"""
     mitsuba: str = ""
     """a Python interpreter that has the package mitsuba; empty for no side-by-side"""
     cycles: str = ""

@@ -36,6 +36,32 @@ def frontier(path: Path, rows: Sequence[Any], title: str) -> None:
     pyplot.close(figure)
 
 
+def bounces(path: Path, rows: Sequence[Any], title: str) -> None:
+    """Error over seconds a view, the mean of the environments: a line for each material, broken of direct light alone."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(6, 4), layout="constrained")
+    for number, name in enumerate(dict.fromkeys(row.map for row in rows)):
+        for direct in (True, False):
+            settings: dict[str, list[Any]] = {}
+            for row in rows:
+                if row.map == name and row.seconds and row.setting.endswith("no bounces") == direct:
+                    settings.setdefault(row.setting, []).append(row)
+            errors = [np.sqrt(np.mean([row.rmse_percent**2 for row in own])) for own in settings.values()]
+            style = {"linestyle": "--" if direct else "-", "color": f"C{number}", "marker": "o", "markersize": 3}
+            axes.loglog([own[0].seconds for own in settings.values()], errors, **style, label=None if direct else name)
+    axes.set(xlabel="seconds a view, all environments", ylabel="tone-mapped RMSE, %; broken: direct light alone")
+    axes.grid(True, which="both", alpha=0.3)
+    axes.legend(fontsize=7)
+    figure.suptitle(title, fontsize=10)
+    with written_atomically(path) as temporary:
+        figure.savefig(temporary, dpi=120)
+    pyplot.close(figure)
+
+
 def worst_by_setting(rows: Iterable[Any]) -> tuple[list[float], list[float]]:
     """Seconds and the largest error of each setting, without exact maps (a mirror's)."""
     worst: dict[str, tuple[float, float]] = {}

@@ -29,12 +29,12 @@ from stages.distill.stage import distill
 from stages.prep.options import PrepOptions
 from stages.prep.stage import prep
 from stages.report import measures, plots
-from stages.report.conditions import write_csv
 from stages.report.contrast import WAVES
 from stages.report.ground import Ground
 from stages.report.kept import contrast_kept
 from stages.report.options import PriorReportOptions
 from stages.report.prompts import IDENTIFIED, LADDER, PROMPTS, Prompt
+from stages.report.rows import write_csv
 from stages.report.shapes import SHAPES
 
 TEXTURE = 512

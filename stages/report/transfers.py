@@ -28,8 +28,8 @@ from stages.distill.views import Surface, Views
 from stages.light.textured_model import TexturedModel
 from stages.prep.options import PrepOptions
 from stages.prep.stage import prep
-from stages.report.conditions import write_csv
 from stages.report.options import TransfersReportOptions
+from stages.report.rows import write_csv
 from stages.report.transfer import report_transfer
 
 ENDINGS = (".glb", ".gltf")

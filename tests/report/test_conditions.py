@@ -3,8 +3,11 @@
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from stages.light.cells import Cells
+from stages.light.transport import cached_light_set
 from stages.report import conditions as module
 from stages.report.options import ReportOptions
 from tests.light import scenes
@@ -18,6 +21,11 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "CONVERGED", module.Quality(768, 256, extra=False, smooth=False))
     monkeypatch.setattr(module, "QUADRATURE_PIXELS", 4)
     monkeypatch.setattr(module.steps, "PIXELS", 4)
+    monkeypatch.setattr(module.bounce_rows, "SWEEP", (0.5, 2.0))
+    monkeypatch.setattr(module.bounce_rows, "CONVERGED", module.Quality(608, 288, extra=False, smooth=False))
+    monkeypatch.setattr(module.bounce_rows, "QUADRATURE_PIXELS", 3)
+    plain = Cells.of
+    monkeypatch.setattr(Cells, "of", staticmethod(lambda scene: plain(scene, 300)))
     rows = module.report_conditions(prep, tmp_path / "out", ReportOptions(size=48, env=("studio", "clear_sky")))
     with (tmp_path / "out" / "conditions.csv").open() as stream:
         written = list(csv.DictReader(stream))
@@ -34,3 +42,18 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert worst("converged, against quadrature") < 0.5
     mirrors = [row.rmse_percent for row in rows if row.map == "m1_r0" and row.setting == "standard"]
     assert max(mirrors) < 1e-3  # looked up, not sampled
+
+    def plaster(setting: str) -> float:
+        return max(row.rmse_percent for row in rows if row.setting == setting and row.map == "white plaster")
+
+    assert plaster("2 x standard, 2 bounces") < plaster("draft, 2 bounces") < plaster("2 x standard, no bounces") / 2
+    assert 0 < plaster("converged, one bounce, against quadrature") < 1
+    assert (tmp_path / "out" / "bounces.png").stat().st_size > 10_000
+
+
+def test_what_is_convex_has_no_rows_with_bounces() -> None:
+    """Nothing to be measured, and nothing asked of its rays."""
+    scene, lights = scenes.sphere(3), cached_light_set((scenes.even_light(),))
+    points = scenes.view_of(scene, 16)
+    subject = module.Subject(scene, np.eye(4), 0.5, points, lights, np.arange(4), [], [], np.zeros(1))
+    assert module.bounce_rows.bounce_rows(subject, 2, 0) == []
