@@ -57,7 +57,7 @@ def bounces(scene: Scene) -> list[tuple[str, NDArray]]:
     cells = []
     for count, name in ((0, "direct light"), (4, "with four bounces")):
         for look, azimuth, elevation in zip(looks, (35, 35, 50), (12, 62, 24), strict=True):
-            drawn = replace(look, thrown=look.throws(preview_light(), count)) if count else look
+            drawn = look.under([preview_light()], count)
             c2w = camera(look.scene.vertices.astype(np.float64), azimuth, elevation)
             cells.append((name, srgb_encode(draw_view(drawn, preview_light(), c2w, SIZE).over(backdrop(SIZE)))))
     return cells

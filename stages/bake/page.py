@@ -77,7 +77,7 @@ def page_of(mesh: Artifact, made: Provenance, look: Look, facts: list[Facts], si
         prompt=str(said["prompt"] or ""),
         meta=f"{source}, {len(mesh['triangles']):,} triangles, {extent(sets)}",
         checks=checks(mesh, sets, facts, look.scene, lights, said),
-        shots=pictures(look, max(32, 4 * size // 5 // 2 * 2)),
+        shots=pictures(look, max(32, 4 * size // 5 // 2 * 2), said.get("bounces", 0)),
         facts=how_made(mesh, made),
         licences=[*LICENCES, *([SD_LICENCE] if str(said["guidance"].get("name")) == "sd" else [])],
         light=page_light(),
@@ -93,11 +93,15 @@ def extent(sets: list[TextureSet]) -> str:
     return f"{len(sets)} texture sets of {f'{low} to ' if low < high else ''}{high} texels along an edge"
 
 
-def pictures(look: Look, size: int) -> list[Shot]:
-    """The asset from two sides under lights that nothing was trained on; the view in 3-D has a third one, preview.png's."""
+def pictures(look: Look, size: int, bounces: int = 0) -> list[Shot]:
+    """The asset from two sides under lights that nothing was trained on; the view in 3-D has a third one, preview.png's.
+
+    Args: bounces: of light between surfaces, which the view in 3-D shows none of.
+    """
     used = look.scene.vertices[np.unique(look.scene.triangles)].astype(np.float64)
     lights, places = (dusk(), softbox()), [camera(used, *view) for view in SHOT_VIEWS.values()]
     cached_light_set(lights)  # once, not in every thread
+    look = look.under(lights, bounces)
     sides = in_parallel(lambda c2w: draw_views(look, lights, c2w, size), places)
     return [
         Shot(f"{light.name.capitalize()}, {name}", srgb_encode(picture.over(backdrop(size))))
@@ -146,6 +150,7 @@ def how_made(mesh: Artifact, made: Provenance) -> dict[str, str]:
         "Seed": str(made.seed),
         "Guidance": ", ".join([name, *(f"{key} {value[:12]}" for key, value in guidance.items() if isinstance(value, str))]),
         "Lights": ", ".join(said["environments"]) or "none",
+        **({"Light between surfaces": f"{said['bounces']} bounces"} if said.get("bounces") else {}),
         "UVs": "the source's own" if said["uv_kept"] else "made new",
         "Material slots": ", ".join(slot or "(unnamed)" for slot in said["material_slots"]),
         "Found in the mesh": ", ".join(f"{key.replace('_', ' ')} {value:,}" for key, value in found.items()) or "nothing",

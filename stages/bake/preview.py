@@ -87,7 +87,7 @@ def contact_sheet(look: "Look", size: int, bounces: int = 0) -> NDArray[np.float
     """
     light, scene = preview_light(), look.scene
     cached_light_set((light,))  # once, not in every thread
-    look = replace(look, thrown=look.throws(light, bounces)) if bounces else look
+    look = look.under([light], bounces)
     drawn = in_parallel(lambda c2w: draw_view(look, light, c2w, size), cameras(scene.vertices, scene.triangles))
     cells = [srgb_encode(picture.over(backdrop(size))) for picture in drawn]
     named = "albedo.png" if len(look.maps) == 1 else "albedo of each set"
@@ -100,7 +100,7 @@ class Look:
     """A mesh and its textures.
 
     uv: (F, 3, 2), v down. maps: (H, W, 5) of each texture set. of_triangle: (F,) row of its maps. thrown: what it throws on
-    itself under the light that it is drawn in, or None.
+    itself under the lights that it is drawn in, or None.
     """
 
     scene: Scene
@@ -129,15 +129,16 @@ class Look:
             result[mine] = look_up(self.maps[number], middle[mine], edges[mine], (wrap, wrap))[:, :5]
         return result
 
-    def throws(self, light: Environment, bounces: int) -> Thrown | None:
-        """What it throws on itself under a light; None where it sees next to nothing of itself."""
-        between = Between.of(self.scene, [light], 0, bounces)
+    def under(self, lights: Sequence[Environment], bounces: int) -> "Look":
+        """The same with what it throws on itself under some lights, where it sees more than next to nothing of itself."""
+        between = Between.of(self.scene, list(lights), 0, bounces) if bounces else None
         if between is None:
-            return None
+            return self
         sides = between.cells.sides(self.scene)
         across = np.stack(tangent_frame(sides.ng), 1) * between.cells.width
         material = self.material(sides, edges(self.scene, sides.triangle, across))
-        return Thrown(between.cells, between.exchange.solved(material, bounces), between.exchange.sky)
+        thrown = Thrown(between.cells, between.exchange.solved(material, bounces), between.exchange.sky)
+        return replace(self, thrown=thrown)
 
     def points(
         self, hits: Hits, directions: NDArray, mask: NDArray[np.bool_], c2w: NDArray, step: float

@@ -399,7 +399,7 @@ def write_models(
         write_obj(out / "model.obj", mesh, relief)
         files += ["model.obj", "model.mtl"]
     write_png(out / "preview.png", contact_sheet(look, preview_size, bounces))
-    return [*files, "preview.png", *write_studio(out, mesh, preview_size)], model.notes
+    return [*files, "preview.png", *write_studio(out, mesh, preview_size, bounces)], model.notes
 
 
 def pictures_of(folder: Path, shown: Shown, wrap: int) -> gltf.Pictures:

@@ -58,8 +58,11 @@ def backdrop(size: int) -> NDArray[np.float32]:
     return np.repeat(ramp[:, None, None], 3, 2)
 
 
-def write_studio(folder: Path, mesh: Artifact, size: int) -> list[str]:
-    """Write preview.json and preview_light.exr. Args: mesh: of prep.npz. size: pixels of a view. Returns: their names."""
+def write_studio(folder: Path, mesh: Artifact, size: int, bounces: int = 0) -> list[str]:
+    """Write preview.json and preview_light.exr.
+
+    Args: mesh: of prep.npz. size: pixels of a view. bounces: of light between surfaces, in the picture. Returns: their names.
+    """
     to_gltf = upright(mesh["to_world"]) @ np.linalg.inv(mesh["to_world"])
     views = [
         {"c2w": in_frame(to_gltf, c2w).tolist(), "column": k % COLUMNS, "row": k // COLUMNS}
@@ -73,6 +76,7 @@ def write_studio(folder: Path, mesh: Artifact, size: int) -> list[str]:
         "transfer": "sRGB",
         "background": {"top": BACKDROP, "bottom": GROUND},
         "light": "preview_light.exr",
+        "bounces": bounces,
         "views": views,
     }
     write_json(folder / "preview.json", said)

@@ -2,8 +2,8 @@
 
 What is rendered is what others would open: model.glb with its own textures, normals and tangents, and preview_light.exr
 as the world; preview.json has the cameras. Blender has a Python of its own, in which this file is run as a script.
-Cycles: direct light alone, as the preview; Principled's GGX without multiple scattering, as in glTF. What shines is seen and
-lights nothing else, as in the preview and in engines.
+Cycles: with as many bounces as the preview has, none by default; Principled's GGX without multiple scattering, as in glTF.
+What shines is seen and lights nothing else, as in the preview and in engines.
 three.js: its standard material and image-based lighting as they come, in headless Chromium (`stages.report.three`).
 """
 
@@ -134,6 +134,7 @@ def in_blender(python: str, asset: Path, views: list[dict], studio: dict, model:
     with tempfile.TemporaryDirectory() as folder:
         size, fov_y = studio["size"], studio["fov_y"]
         job = {"model": model, "views": [view["c2w"] for view in views], "size": size, "fov_y": fov_y}
+        job["bounces"] = studio.get("bounces", 0)
         (Path(folder) / "job.json").write_text(json.dumps(job))
         try:
             subprocess.run([python, __file__, str(asset), folder], check=True, capture_output=True)
@@ -155,7 +156,9 @@ def cycles(asset: str, folder: str) -> None:
     scene.render.film_transparent = scene.render.use_persistent_data = True
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
     scene.cycles.use_adaptive_sampling = scene.cycles.use_denoising = False
-    scene.cycles.max_bounces, scene.cycles.samples, scene.cycles.pixel_filter_type = 0, SAMPLES, "BOX"
+    scene.cycles.samples, scene.cycles.pixel_filter_type = SAMPLES, "BOX"
+    scene.cycles.max_bounces = scene.cycles.diffuse_bounces = scene.cycles.glossy_bounces = job["bounces"]
+    scene.cycles.sample_clamp_indirect = 0
     load = bpy.ops.wm.obj_import if job["model"].endswith(".obj") else bpy.ops.import_scene.gltf
     load(filepath=str(Path(asset) / job["model"]))
     for material in bpy.data.materials:

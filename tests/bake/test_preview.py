@@ -12,6 +12,7 @@ from scipy.ndimage import binary_erosion, uniform_filter
 from scipy.stats import norm
 
 from stages.bake import preview
+from stages.bake.page import pictures
 from stages.bake.preview import Look, draw_view, edges, footprint, rougher
 from stages.bake.studio import EXPOSURE, FOV_Y, camera, cameras, write_studio
 from stages.core.artifact import load_npz
@@ -180,6 +181,7 @@ def test_cameras_see_the_model_where_the_picture_shows_it(tmp_path: Path, up: np
     mesh = load_npz(save_prep(tmp_path / "prep.npz", cube().with_(to_world=move)), PREP)
     assert write_studio(tmp_path, mesh, 64) == ["preview.json", "preview_light.exr"]
     said = json.loads((tmp_path / "preview.json").read_text())
+    assert said["bounces"] == 0
     to_gltf = np.eye(4)
     to_gltf[:3, :3] = Y_UP_TO_WORLD[:3, :3].T @ up[:3, :3]
     model = trimesh.transform_points(mesh["source_vertices"], to_gltf)
@@ -241,9 +243,20 @@ def test_what_the_object_throws_on_itself_is_drawn() -> None:
     uv[:, :, 0] = np.where(flat, 0.25, 0.75)[:, None]
     maps = np.array([[[0.8, 0.05, 0.05, 0.8, 0], [0.8, 0.8, 0.8, 0.8, 0]]], "f4").repeat(2, 0)
     look, light, c2w = worn(scene, uv, maps), preview_light(), camera(scene.vertices.astype(float), 30, 25)
-    direct, bounced = (draw_view(replace(look, thrown=look.throws(light, b) if b else None), light, c2w, 48) for b in (0, 2))
+    direct, bounced = (draw_view(look.under([light], bounces), light, c2w, 48) for bounces in (0, 2))
     walls = direct.alpha & (direct.material[..., 2] > 0.5)
     red, blue = ((bounced.color - direct.color)[walls][:, channel].mean() for channel in (0, 2))
     assert red > 1.3 * blue > 0 and bounced.color.max() < 1.5 * direct.color.max()
     ball = scenes.sphere(3)
-    assert worn(ball, np.zeros((len(ball.triangles), 3, 2), "f4"), maps).throws(light, 2) is None
+    assert worn(ball, np.zeros((len(ball.triangles), 3, 2), "f4"), maps).under([light], 2).thrown is None
+
+
+def test_pictures_of_the_page_show_what_the_object_throws_on_itself() -> None:
+    """A white corner is brighter with bounces under both of the lights, and the same from behind, where it is convex."""
+    scene = scenes.box_in_corner()
+    maps = np.full((2, 2, 5), (0.8, 0.8, 0.8, 0.8, 0), "f4")
+    look = worn(scene, np.zeros((len(scene.triangles), 3, 2), "f4"), maps)
+    direct, bounced = (pictures(look, 32, bounces) for bounces in (0, 2))
+    grown = {shot.caption: (other.pixels - shot.pixels).mean() for shot, other in zip(direct, bounced, strict=True)}
+    assert len(grown) == 4 and all((more > 0.02) if "front" in name else (more == 0) for name, more in grown.items())
+

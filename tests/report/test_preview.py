@@ -1,5 +1,6 @@
 """An asset beside other renderers: what they draw is laid over preview.png, and what cannot be compared is said."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -77,6 +78,24 @@ def test_the_same_picture_and_a_brighter_one(tmp_path: Path, monkeypatch: pytest
     assert lines[0] == "asset,renderer,view,psnr_db" and len(lines) == 7
     for renderer in ("cycles", "three"):
         assert (tmp_path / "out" / f"preview_thing_{renderer}.png").is_file()
+
+
+@pytest.mark.parametrize("bounces", (0, 3))
+def test_blender_is_asked_for_as_many_bounces_as_the_picture_has(
+    bounces: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A picture of an earlier day, which says nothing of them, has none."""
+    asked = []
+
+    def run(command: list[str], **_: object) -> None:
+        folder = Path(command[-1])
+        asked.append(json.loads((folder / "job.json").read_text()))
+        np.save(folder / "0.npy", radiance(0))
+
+    monkeypatch.setattr(preview.subprocess, "run", run)
+    studio = {"size": SIZE, "fov_y": 0.5, **({"bounces": bounces} if bounces else {})}
+    preview.in_blender("python", tmp_path, [{"c2w": np.eye(4).tolist()}], studio)
+    assert [job["bounces"] for job in asked] == [bounces]
 
 
 def test_two_assets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
