@@ -289,6 +289,8 @@ def _heads(phrase: Phrase, after: Phrase) -> bool:
 
 def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     """Whether a phrase after a comma says more of the one before: "a jar, glossy blue"; "oak, brown"."""
+    if after and after.join.kind in ("on", "over") and after.substance and phrase.coats and set(phrase.weather) & PEELS:
+        return False  # "a chair, peeling white paint on grey wood"
     paired = after and after.region and after.join.kind == "and" and after.where not in PARTS
     if phrase.region or phrase.thing or (phrase.part and not phrase.substance) or paired:
         return False

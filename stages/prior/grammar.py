@@ -181,6 +181,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
     """Put a token where it belongs in a phrase. Args: early: one of the first two, which may be the thing itself."""
     kind, text = token.kind, token.text
     if kind == "substance":
+        phrase.part = ""  # "white hex mosaic"
         _name(phrase, text)
     elif kind in ("color", "finish", "weather", "unknown", "size"):
         said = phrase.of_kind(kind)
@@ -203,6 +204,11 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.thing = text  # "striped cushion"
     elif kind == "part" and phrase.region and phrase.region.kind == "badge" and token.value.kind in ("middle", "front"):
         return  # "a brass boss in the middle"
+    elif kind == "part" and text in SIDES and _is_small(phrase):  # "a brass valve on top"
+        phrase.region, phrase.where, phrase.placed = Region(token.value.kind, SMALL), text, phrase.says_what
+    elif kind == "part" and phrase.says_what and phrase.region and phrase.region.kind in WITHIN and text.startswith(PLACES):
+        phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "runes along the blade"
+        phrase.region = WITHIN[phrase.region.kind] or phrase.region
     elif kind in ("part", "shape") and (phrase.region is None or kind == "part" or text in PAINTS):
         phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
     elif kind == "thing" and not phrase.closed:
@@ -211,6 +217,23 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.part = text
     elif kind == "animal":
         phrase.animal = text
+
+
+SIDES = frozenset([f"{at} {side}" for at in ("on", "on the", "at the", "near the", "on its", "at its")
+                   for side in ("top", "bottom", "back", "rear", "left side", "right side", "base")])  # fmt: skip
+"""Where a small part may be, and its share of the extent there."""
+
+SMALL = 0.12
+
+
+PLACES = ("along the", "along its", "on the", "on its", "around the", "over the", "across the")
+WITHIN = {"crevices": None, "badge": Region("spots", 0.2, 0.25)}
+"""Words before the part on which another lies, and the kinds that do, with where they lie on it if it is elsewhere."""
+
+
+def _is_small(phrase: Phrase) -> bool:
+    """Whether what a phrase is of is a small part, of which may be said where it is."""
+    return bool(phrase.part) or (phrase.region is not None and phrase.region.kind in ("badge", "details"))
 
 
 RINGED = ("around", "along the", "on top", "on the top", "at the top", "near the top", "at the base", "at the bottom")
@@ -251,8 +274,8 @@ def _name(phrase: Phrase, text: str) -> None:
         phrase.substance = text  # "molten gold"
     elif family(old) == "rust" and family(text) == "metal":
         return  # "verdigris copper"
-    elif old.endswith("plated"):
-        return  # "silver-plated copper"
+    elif old.endswith("plated") or (old in ("gilt", "gilded") and family(text) == "metal"):
+        return  # "silver-plated copper", "gilt bronze"
     elif text in BOARDS or (text in GENERIC and family(old) == family(text)):
         return  # the first says which
     else:

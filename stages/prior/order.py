@@ -167,7 +167,7 @@ def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
         if k and not (gathering(over[k - 1].substance) or over[k - 1].weather):
             break
         painted = not (k or thing.weather or RUSTY & set(thing.thing.split(" "))) and _paints(phrase)
-        whole = (_covers(phrase) or painted or _sawn(phrase, thing)) if named or not k else False
+        whole = (_covers(phrase) or painted or _of_usual(phrase, thing)) if named or not k else False
         elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
         if elsewhere or not (whole or (not k and _upholsters(phrase, thing))) or (thing.colors and not named):
             continue
@@ -203,10 +203,19 @@ def _paints(phrase: Phrase) -> bool:
     return paint and phrase.join.kind == "with" and not (phrase.weather or phrase.region)
 
 
-def _sawn(phrase: Phrase, thing: Phrase) -> bool:
-    """Whether a thing of wood is of the boards that it has: "a ship with dark oak planks"."""
+SKINS = ("fabric", "leather", "stone", "ceramic", "plastic")
+"""Families of stuffs that are all of a thing if they are any of it: "a stroller with charcoal fabric"."""
+
+
+def _of_usual(phrase: Phrase, thing: Phrase) -> bool:
+    """Whether what a thing is said to have is what it is all made of: "a ship with dark oak planks"."""
     usual = split(OBJECTS[thing.thing].made)[0]
-    return phrase.boards and phrase.join.kind == "with" and bool(usual.substance) and family(usual.substance) == "wood"
+    if phrase.join.kind != "with" or not (usual.substance and phrase.substance) or gathering(phrase.substance):
+        return False
+    kin = family(phrase.substance) == family(usual.substance)
+    same = phrase.boards or KNOWN[phrase.substance][0].look == KNOWN[usual.substance][0].look
+    whole = kin and (same or family(usual.substance) in SKINS)
+    return whole and not (set(phrase.weather) & PEELS or phrase.thing or phrase.part)
 
 
 def _upholsters(phrase: Phrase, thing: Phrase) -> bool:

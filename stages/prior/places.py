@@ -171,7 +171,10 @@ JOINED = {
     "tip": PARTS["tip"], "sole": PARTS["sole"], "handle": PARTS["handle"], "line": PARTS["lining"], "stud": SHAPES["studs"],
     "all": Region("all", 1.0), "top": PARTS["lid"], "fade": FADE, "half": Region("right", 0.5),
     "swirl": Region("patches", 0.45, 0.25, 0.3),
-    "bottom": PARTS["base"], "legs": PARTS["legs"], "seat": PARTS["seat"], "paint": Region("all", 1.0),
+    **{part: PARTS[part] for part in ("head", "wings", "eyes", "blade", "lid", "neck", "belly", "back", "feet", "roof", "front",
+                                      "tail", "beak", "hair", "horns", "sleeves", "base")},
+    "shell": PARTS["carapace"], "bottom": PARTS["base"], "legs": PARTS["legs"], "seat": PARTS["seat"],
+    "paint": Region("all", 1.0),
 }  # fmt: skip
 """Where a phrase lies that only its joining word tells."""
 

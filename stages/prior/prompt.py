@@ -253,7 +253,8 @@ class Reading:
         of_part = _stuff_of_part(phrase, beneath)
         if of_part:
             return self._of(stuff(of_part, True), phrase)
-        if made and not (phrase.colors and beneath is not None and _solid(split(made)[0])):
+        horny = phrase.animal in SHELLED and not beneath
+        if made and not horny and not (phrase.colors and beneath is not None and _solid(split(made)[0])):
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
             inner.weather, inner.region, inner.where = phrase.weather, None, ""
@@ -422,7 +423,8 @@ def _stuff_of_part(phrase: Phrase, beneath: Coat | None) -> str:
     said = phrase.where or phrase.part or (phrase.thing if beneath is not None else "")
     soft = beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal", "ice")
     hard = beneath is not None and _family_of(beneath.look) in ("metal", "wood", "stone", "ceramic", "paint", "gem")
-    sorts = ("", *(["soft"] if soft else []), *(["hard"] if hard else []))
+    cloth = beneath is not None and _family_of(beneath.look) in ("fabric", "leather")
+    sorts = ("", *(["soft"] if soft else []), *(["hard"] if hard else []), *(["cloth"] if cloth else []))
     found = (MADE.get((name, sort), "") for name in (said, said.split(" ")[-1]) for sort in sorts)
     return next(filter(None, found), "") if phrase.colors else ""
 
@@ -567,7 +569,9 @@ def _described(wanted: Stuff, named: RGB) -> RGB:
     if wanted.paintable or wanted.metallic or wanted.look in PAINTABLE:
         return named
     own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
-    if float(np.linalg.norm(own - other)) > SIMILAR or np.hypot(*other[1:]) < GREYISH / 2 < np.hypot(*own[1:]):
+    one, two = np.hypot(*own[1:]), np.hypot(*other[1:])
+    plain = two < GREYISH / 2 < one or one < GREYISH < two - 2 * GREYISH  # grey moss, and yellow porcelain
+    if float(np.linalg.norm(own - other)) > SIMILAR or plain:
         return named
     return _triple(np.array(wanted.color) + 0.3 * (np.array(named) - np.array(wanted.color)))
 

@@ -67,7 +67,7 @@ ASIDE = words("near, beside, beside the, next to, next to the, behind, behind th
               "close to, close to the, by the")
 """Words before a thing that only says where another is: "rust streaks beside the tap"."""
 
-PAINTED = ("painted", "lacquer", "enamel", "whitewash", "gilded")
+PAINTED = ("painted", "lacquer", "enamel", "whitewash", "gilded", "japanned")
 """What is said of a stuff after its name: "iron painted black"."""
 
 DYED = ("colored", "coloured", "tinted", "dyed", "toned", "hued", "color", "colour")
@@ -90,6 +90,7 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     plain = re.sub(r"(?:\b([a-z]+) )?\b([a-z-]+)(?:'s|(?<=s)') ([a-z-]+(?: [a-z-]+)?)", _owned, plain)
     for simile, meant in SIMILES:
         plain = re.sub(simile, meant, plain)
+    plain = re.sub(LIKENESS, _likened, plain)
     plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
     heard = re.findall(r"#[0-9a-f]{6}\b|[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
     found: list[Token] = []
@@ -131,6 +132,17 @@ def _owned(found: re.Match[str]) -> str:
     return " ".join(filter(None, ("" if kinds.get(before, "") in ("substance", "thing") else before, owned)))
 
 
+LIKENESS = (r"\b(?:that )?(?:looks? |gleams? |shines? |glows? |shimmers? )?like an? ([a-z][a-z -]*?)"
+            r"(?=$|[,;.]| and | with | on | but )")
+
+
+def _likened(found: re.Match[str]) -> str:
+    """What is like a thing has its colour: "a hat like a ripe aubergine"."""
+    *_, last = words_of = found[1].split(" ")
+    token = _table()[0].get(" ".join(words_of[-2:])) or _table()[0].get(last)
+    return f" {found[1]} coloured" if token and token.kind == "thing" else found[0]
+
+
 ARTICLES = {"a": "a", "an": "a", "the": "the"}
 
 TURNED = (r"((?:sun-?|rain-?|smoke-?|age-?)?(?:weathered|greyed|grayed|aged|bleached|darkened|yellowed|seasoned|silvered|"
@@ -143,7 +155,14 @@ HANDS = ("rain|sun|sunlight|age|time|years|use|decades|centuries|weather|wind|se
 NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on )"
 SIMILES = (
     (r"\bas (?!well|soon|long|much|many|far)([a-z]+(?:-[a-z]+)?) as " + NOUNS, r"\1"),  # "as black as a raven's wing"
-    (r"\b(?:in )?(?:the )?colou?r of " + NOUNS, r"\1 coloured"),  # "the colour of honey"
+    (r"\b(?:shaped|formed|sculpted|modelled|modeled) (?:like|as|into) " + NOUNS, ""),  # "a jug shaped like a pineapple"
+    (r"\bin the (?:shape|form) of " + NOUNS, ""),
+    (rf"\b((?:dark |light |pale )?(?:{HUES})) over ((?:dark |light |pale )?(?:{HUES}))(?=$|[,;.]| with | and )",
+     r"\2, upper half \1"),  # "a helicopter, red over white"
+    (r"\b(?:hanging|dangling|sprouting|rising|protruding|sticking out|hung) (?:from|out of|off) (?=the |its )", "at "),
+    (rf"\b({HUES}) as " + NOUNS, r"\1"),  # "legs black as coal"
+    (r"\b(?:(?:in|of) )?(?:the )?(?:exact |same |deep |rich |dark |pale )?(?:colou?r|shade|hue|tint|tone) of " + NOUNS,
+     r"\1 coloured"),  # "the colour of honey"
     (r"\b(?:with|in|and) (?:an? |the )?((?:(?!(?:with|and|or) )[a-z-]+ ){0,3}?[a-z-]+) "
      r"(?:finish|coating|paint job|paintwork|surface|texture|look)\b", r"finished in \1"),
     (r"\b(?:an? )?(?:crackled?|cracked|crazed|craquelure) (?:glaze|glazing)\b", "glaze crackled"),
@@ -192,12 +211,29 @@ SIMILES = (
 def _dyed(found: list[Token]) -> list[Token]:
     """Names of substances whose colour alone is meant, as colours: "honey coloured glass"."""
     kept: list[Token] = []
-    for token in found:
+    for token, after in zip(found, [*found[1:], Token("end", "")], strict=False):
         if token.kind != "dyed":
             kept.append(token)
+        elif after.kind == "color":
+            continue  # "shagreen dyed teal"
         elif kept and (kept[-1].kind == "substance" or kept[-1].text in LIKENED):
-            kept[-1] = Token("color", kept[-1].text)
+            kept[-1] = kept[-1]._replace(kind="color", value=None)
+        elif kept and kept[-1].kind == "thing":
+            kept[-1:] = _hues_of(kept[-1].text)
     return kept
+
+
+def _hues_of(thing: str) -> list[Token]:
+    """The colour that everybody knows of a thing, as tokens: "the colour of a carrot"."""
+    if thing in COLORS:
+        return [Token("color", thing)]
+    made = OBJECTS[thing].made.split(" with ")[0]
+    token, _ = _longest(made.split(" "), 0)
+    if token and token.kind == "substance":
+        return [Token("color", token.text)]
+    hues = [Token("color", word) for word in made.split(" ") if word in COLORS or word in CHANGES or word in LEANINGS]
+    stuff, _ = _longest(made.split(" ")[-1:], 0)
+    return hues or ([Token("color", stuff.text)] if stuff and stuff.kind == "substance" else [])
 
 
 OVER_OR_UNDER = ("under", "beneath", "below", "underneath", "above")
@@ -331,7 +367,12 @@ def _names_stuff(text: str) -> bool:
 
 def _worth(text: str) -> bool:
     token = _table()[0].get(text)
-    return token is not None and token.kind not in ("filler", "join", "size", "half")
+    short = token is not None and token.kind in ("thing", "part") and len(text) < LONG
+    return token is not None and not short and token.kind not in ("filler", "join", "size", "half")
+
+
+LONG = 8
+"""Letters of the shortest thing for which another word may be a slip of the pen."""
 
 
 def _slips(word: str) -> Iterator[str]:
@@ -379,6 +420,11 @@ def _resolved(found: list[Token]) -> list[Token]:
             continue  # "left unglazed"
         if token.text in ("straw", "reed", "reeds") and any(t.text.startswith("thatch") for t in (*behind, *ahead)):
             continue  # "thatched straw"
+        dyed = token.kind == "thing" and token.text in COLORS and not (token.article or ahead)
+        if dyed and result and result[-1].text == "in":
+            token = token._replace(kind="color", value=None)  # "a mesh upper in lemon"
+        elif token.text in TIMBER and _of_timber(token.text, ahead[:2]):
+            token = Token("substance", f"{token.text} wood")  # "ash legs", "a cherry table"
         if token.kind == "thing" and ahead and ahead[0].text in COLORS and any(t.kind == "thing" for t in result):
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
@@ -392,21 +438,37 @@ def _resolved(found: list[Token]) -> list[Token]:
             elif token.text in KNOWN and ahead and _is_jewel(ahead[0]):
                 names = set()  # "an emerald brooch"
             if names or shaped or any(t.kind == "substance" for t in behind):
-                token = Token("color", token.text)
+                token = token._replace(kind="color", value=None)
         if token.kind == "color" and token.article and not ahead and token.text in OBJECTS:
-            token = Token("thing", token.text)  # "an orange"
+            token = token._replace(kind="thing", value=None)  # "an orange"
         elif token.text in ("shell", "carapace") and any(t.text in BEARERS for t in result):
             token = Token("part", "carapace", PARTS["carapace"])
         elif token.text == "shell" and any(t.kind in ("thing", "part") for t in result):
             token = Token("part", "body", PARTS["body"])  # "a helmet with a white shell"
         elif token.kind == "thing" and token.text in KNOWN and _is_stuff(token, ahead, behind):
-            token = Token("substance", token.text)
+            token = token._replace(kind="substance", value=None)
         elif token.kind == "part" and token.text in WORN & OBJECTS.keys() and not any(t.kind == "thing" for t in result):
-            token = Token("thing", token.text)  # "faded jeans"
+            token = token._replace(kind="thing", value=None)  # "faded jeans"
         elif token.kind == "thing" and token.text in PARTS and (result or ahead):
             token = Token("part", token.text, PARTS[token.text])
         result.append(token)
     return result
+
+
+TIMBER = ("ash", "cherry", "chestnut")
+"""Trees whose names mean something else, too."""
+
+
+def _of_timber(tree: str, ahead: list[Token]) -> bool:
+    """Whether the name of a tree stands for its wood: before what is usually of it, or ash before a part."""
+    part = tree == "ash" and any(t.kind == "part" and " the" not in t.text and " top" not in t.text for t in ahead)
+    return part or any(map(_of_wood, ahead if tree == "ash" else ahead[:1]))
+
+
+def _of_wood(token: Token) -> bool:
+    """Whether a thing is usually of wood."""
+    made = OBJECTS[token.text].made.split(" ")[-1] if token.kind == "thing" else ""
+    return made in KNOWN and KNOWN[made][0].family == "wood"
 
 
 BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beetle", "armadillo", "ladybug",

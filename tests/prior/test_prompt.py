@@ -100,7 +100,14 @@ def test_prompts_of_every_form_are_understood_as_they_were_judged(read) -> None:
      ("red brick, 4k, pbr, unreal engine 5", "red brick"),
      ("steel visible under chipped blue paint", "blue paint chipped to steel"),
      ("a frost giant's axe", "an axe"), ("a wok of carbon steel seasoned to black", "a black carbon steel wok"),
-     ("a leather helmet, brown leather", "a brown leather helmet"), ("an oak toy, worn by years of use", "a worn oak toy"),
+     ("a leather helmet, brown leather", "a brown leather helmet"), ("a cherry table", "a cherry wood table"),
+     ("a jug shaped like a pineapple, glossy yellow", "a glossy yellow jug"),
+     ("a hat like a ripe aubergine", "an aubergine hat"),
+     ("a box of shagreen dyed teal", "a box of teal shagreen"), ("a white and black hex mosaic", "a white and black mosaic"),
+     ("a van, red over white", "a van, white, upper half red"), ("a red-roofed white cottage", "a white cottage, red roof"),
+     ("a car the shade of a ripe tangerine", "a tangerine car"),
+     ("a chair, steel legs black as coal", "a chair, steel legs black"),
+     ("an oak toy, worn by years of use", "a worn oak toy"),
      ("matte, dark red paint", "matte dark red paint"), ("an iron radiator painted cream", "cream painted iron radiator")],
 )  # fmt: skip
 def test_one_thing_said_in_two_ways(read, prompt: str, same: str) -> None:  # type: ignore[no-untyped-def]
@@ -144,7 +151,9 @@ def test_two_colours_of_a_pattern_leave_nothing_of_what_is_beneath(read) -> None
     ("prompt", "base"),
     [("a revolver with ivory grips and a nickel finish", "steel"), ("a walnut sideboard with a satin finish", "walnut"),
      ("peeling blue paint on an old wooden door", "oak"), ("a red fox, fluffy fur", "fur"),
-     ("a crate with white paint chipped to bare aluminium", "aluminium"), ("a Bluetooth speaker wrapped in linen", "linen")],
+     ("a crate with white paint chipped to bare aluminium", "aluminium"), ("a stroller with grey fabric", "fabric"),
+     ("a chair, peeling white paint on grey wood", "weathered wood"), ("a box that looks like tortoiseshell", "glossy plastic"),
+     ("a Bluetooth speaker wrapped in linen", "linen")],
 )  # fmt: skip
 def test_what_the_whole_is_made_of_is_found(read, prompt: str, base: str) -> None:  # type: ignore[no-untyped-def]
     assert read(prompt).base.look == base
