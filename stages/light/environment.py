@@ -117,19 +117,26 @@ def bilinear(radiance, direction, found):  # type: ignore[no-untyped-def]
     height, width, _ = radiance.shape
     u = (0.5 - math.atan2(direction[1], direction[0]) / (2 * math.pi)) * width
     v = math.acos(min(max(direction[2], -1.0), 1.0)) / math.pi * height
-    bilinear_at(radiance, u, v, found)
+    found[0], found[1], found[2] = bilinear_at(radiance, u, v)
 
 
-@compiled
-def bilinear_at(radiance, u, v, found):  # type: ignore[no-untyped-def]
-    """Write the bilinear radiance at column u and row v, whose texels' centres are at +0.5, into `found`, (3,)."""
+@compiled(inline="always")
+def _mixed(rows, left, right, weights, c):  # type: ignore[no-untyped-def]
+    above, below = rows
+    one, other = above[left, c] * weights[0] + above[right, c] * weights[1], below[left, c] * weights[2]
+    return one + other + below[right, c] * weights[3]
+
+
+@compiled(inline="always")
+def bilinear_at(radiance, u, v):  # type: ignore[no-untyped-def]
+    """The bilinear radiance at column u, 0 to the width, and row v; texels' centres are at +0.5."""
     height, width, _ = radiance.shape
     u, v = u - 0.5, v - 0.5
     column, row = math.floor(u), math.floor(v)
     fu, fv = u - column, v - row
-    left, right = int(column) % width, (int(column) + 1) % width
+    left = int(column) if column >= 0 else width - 1
+    right = left + 1 if left + 1 < width else 0
     top, bottom = min(max(int(row), 0), height - 1), min(max(int(row) + 1, 0), height - 1)
-    for c in range(3):
-        above = radiance[top, left, c] * (1 - fu) + radiance[top, right, c] * fu
-        below = radiance[bottom, left, c] * (1 - fu) + radiance[bottom, right, c] * fu
-        found[c] = above * (1 - fv) + below * fv
+    weights = (1 - fu) * (1 - fv), fu * (1 - fv), (1 - fu) * fv, fu * fv
+    rows = radiance[top], radiance[bottom]
+    return _mixed(rows, left, right, weights, 0), _mixed(rows, left, right, weights, 1), _mixed(rows, left, right, weights, 2)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
 from stages.core.albedo import MIN_COSINE
+from stages.core.lanes import LANES, fill, load, store
 from stages.core.parallel import compiled
 from stages.light.gbuffer import GBuffer
 from stages.light.lamps import Lamps
@@ -37,7 +38,7 @@ def open_highlights(
     Args: alphas: (P, S) of the lobes.
     """
     shown = np.empty((len(points.n), 2 * alphas.shape[1], channels), np.float32)
-    light = (lamps.direction, lamps.spread, np.ascontiguousarray(lamps.flux[:, :channels]))
+    light = (lamps.direction, lamps.spread, np.ascontiguousarray(lamps.flux))
     in_parts(lambda start, end: _show(points.n, points.wo, alphas, light, start, end, shown), len(shown), 512)
     return shown
 
@@ -80,7 +81,7 @@ def _show(n, wo, alphas, light, start, end, shown):  # type: ignore[no-untyped-d
     lobes, count, channels = alphas.shape[1], len(spread), shown.shape[2]
     sin2, cosine, near = np.empty(count, f32), np.empty(count, f32), np.empty(count, np.int32)
     tan2, grazing, blur, window = np.empty(count, f32), np.empty(count, f32), np.empty(count, f32), np.empty(count, f32)
-    weight, total = np.empty((2, count), f32), np.empty((2, channels), f32)
+    weight, total = np.empty((2, count), f32), np.empty((2, LANES), f32)
     for p in range(start, end):
         ox, oy, oz = wo[p, 0], wo[p, 1], wo[p, 2]
         nx, ny, nz = n[p, 0], n[p, 1], n[p, 2]
@@ -113,13 +114,14 @@ def _show(n, wo, alphas, light, start, end, shown):  # type: ignore[no-untyped-d
                 masking = f32(0.5) * (math.sqrt(f32(1) + a2 * tan2_o) + math.sqrt(f32(1) + a2 * tan2[i]))
                 f = window[i] * a2 / (q * q * masking)
                 weight[0, i], weight[1, i] = (f32(1) - grazing[i]) * f, grazing[i] * f
-            total[:] = 0
+            first, second = fill(f32(0)), fill(f32(0))
             for i in range(m):
-                k = near[i]
-                for c in range(channels):
-                    total[0, c] += weight[0, i] * flux[k, c]
-                    total[1, c] += weight[1, i] * flux[k, c]
-            shown[p, a], shown[p, lobes + a] = total[0], total[1]
+                power = load(flux, near[i] * LANES)
+                first, second = first + power * weight[0, i], second + power * weight[1, i]
+            store(total, 0, first)
+            store(total, LANES, second)
+            for c in range(channels):
+                shown[p, a, c], shown[p, lobes + a, c] = total[0, c], total[1, c]
 
 
 @fast

@@ -39,9 +39,13 @@ def cluster(peaks: NDArray, mean: NDArray, channels: int) -> Lamps:
         channels: of the result's flux, 3 E or more.
     """
     size = peaks.shape[1]
-    share = luminance(peaks.astype(np.float64)) / (np.maximum(mean, np.finfo(float).tiny)[:, None, None] * size**2)
-    towards = share[..., None] * np.stack(texel_directions(size), -1)
-    levels = [np.concatenate([towards, peaks * (4 * np.pi / size**2), share[..., None]], -1)]
+    some = np.nonzero(peaks.any(-1))  # few texels rise above a light's bound
+    bright, directions = peaks[some], np.stack(texel_directions(size), -1)
+    share = luminance(bright.astype(np.float64)) / (np.maximum(mean, np.finfo(float).tiny)[some[0]] * size**2)
+    columns = np.concatenate([share[:, None] * directions[some[1:]], bright * (4 * np.pi / size**2), share[:, None]], 1)
+    cell = np.ravel_multi_index((some[0], *(k * FINEST // size for k in some[1:])), (len(peaks), FINEST, FINEST))
+    finest = np.stack([np.bincount(cell, column, len(peaks) * FINEST**2) for column in columns.T], -1)
+    levels = [finest.reshape(len(peaks), FINEST, FINEST, -1)]
     while levels[-1].shape[1] > COARSE:
         half = levels[-1].shape[1] // 2
         levels.append(levels[-1].reshape(len(peaks), half, 2, half, 2, -1).sum((2, 4)))
@@ -56,8 +60,6 @@ def cluster(peaks: NDArray, mean: NDArray, channels: int) -> Lamps:
         whole = uncut & ~cut
         found.append(np.c_[level[whole], spread[whole], np.nonzero(whole)[0]])
         uncut = cut.repeat(2, 1).repeat(2, 2)
-        if level.shape[1] == FINEST:
-            break
     lamps = np.concatenate(found)
     direction = lamps[:, :3] / np.linalg.norm(lamps[:, :3], axis=1, keepdims=True)
     flux = np.zeros((len(lamps), channels), np.float32)
