@@ -174,7 +174,13 @@ def _is_of(now: Phrase, yarn: str) -> bool:
 
 def _lacks(token: Token, now: Phrase) -> bool:
     """Whether a token says of a phrase what it does not say yet: "grips in charcoal", "handles in oak"."""
-    return not (now.substance if token.kind == "substance" else any(map(is_hue, now.colors)))
+    if token.kind == "substance":
+        return not now.substance or (now.substance in LAYERED and family(token.text) == "wood")
+    return not any(map(is_hue, now.colors))
+
+
+LAYERED = ("plywood", "veneer", "wood", "timber")
+"""Stuffs that are of another that may be named after them: "a plywood seat in walnut"."""
 
 
 def _take(phrase: Phrase, token: Token, early: bool) -> None:

@@ -53,6 +53,8 @@ def _bodies(phrases: list[Phrase]) -> None:
     """A beast's skin is all that one sees of it: "an orc with green skin"."""
     first, *rest = phrases
     for number, skin in enumerate(rest if first.thing and not first.says_stuff else []):
+        if skin.where == "coat" and OBJECTS[first.thing].made.split(" with ")[0].endswith("fur"):
+            skin.region, skin.where = PARTS["body"], "body"  # "a husky with a grey coat"
         told = bool(skin.colors) or not number
         joined = skin.join.kind in ("with", "and", "comma") and not skin.region
         if told and joined and skin.substance.split(" ")[-1] in SKINS:
@@ -113,10 +115,12 @@ SKINS = frozenset(["skin", "hide", "scales", "feathers", "fur"])
 
 def _shade(phrases: list[Phrase]) -> None:
     """A pattern that is only darker or lighter is so than what it lies on: "a grey cat with darker stripes"."""
-    for phrase in phrases[1:]:
+    for number, phrase in enumerate(phrases[1:], 1):
         changed = not phrase.says_what and any(word in CHANGES for word in phrase.colors)
-        if changed and phrase.where in SHAPES.keys() - WEARS.keys():
-            first = phrases[0]
+        part = phrase.where in PARTS and not phrase.within and phrase.region != PARTS["body"]
+        if changed and (part or phrase.where in SHAPES.keys() - WEARS.keys()):
+            whole = [p for p in phrases[:number] if not p.region or p.region.kind == "all"]
+            first = next((p for p in reversed(whole) if any(map(is_hue, p.colors))), phrases[0])
             usual = [word for word in OBJECTS[first.thing].made.split(" ") if is_hue(word)] if first.thing else []
             ground = [word for word in first.colors if is_hue(word)] or [w for w in [first.substance] if w] or usual[:1]
             phrase.colors[:0] = ground

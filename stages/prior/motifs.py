@@ -227,6 +227,10 @@ def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
             ground.substance = first.substance
         elif number == 1 and second.join.kind == "and" and _shared_between(phrases[0], second):
             first.region, first.where = Region("all", 1.0), ""  # "a tent with red and white stripes"
+        elif number and second.where in PARTS and second.join.kind == "and" and second.region and not second.within:
+            first.region, first.where = second.region, second.where  # "with a green and gold tail"
+            part = Phrase(second.join, region=second.region, where=second.where)
+            second.join, second.within, second.region, second.where = Join("with"), part, SHAPES["patches"], ""
         elif number and second.region and second.where in SHAPES:
             share = second.region.share
             first.region, first.where = second.region._replace(share=min(0.8, 1.3 * share)), second.where

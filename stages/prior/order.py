@@ -25,6 +25,8 @@ def ordered(phrases: list[Phrase]) -> Order:
         base += 1
     upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
     first, over = phrases[base], [*reversed(upper), *phrases[base + 1 :]]
+    if upper and upper[0].thing and not (first.thing or first.part) and upper[0].says_stuff:
+        first, over[base - 1] = replace(first, thing=upper[0].thing), replace(upper[0], thing="")  # "a vase, glaze over clay"
     for step in STEPS:
         first, over = step(first, over)
     return first, over
@@ -135,6 +137,16 @@ def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     if not (first.region or gathering(first.substance) or first.substance in ROOFING):
         first = replace(first, region=Region("above", 0.4))
     return body, [first, *others]
+
+
+def _speckled(first: Phrase, over: list[Phrase]) -> Order:
+    """A speckled coat lies all over: "a bottle with a speckled white powder coat"."""
+    mottled = [p.where in MOTTLED and p.coats and not p.within for p in over]
+    return first, [replace(p, region=None, where="") if coat else p for p, coat in zip(over, mottled, strict=True)]
+
+
+MOTTLED = ("speckled", "flecked", "mottled", "marbled", "dappled")
+"""Patterns that a coat may have of itself."""
 
 
 def _told_after(first: Phrase, over: list[Phrase]) -> Order:
@@ -316,7 +328,7 @@ def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
 
 
 STEPS = (
-    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _flanked, _of_body, _told_after, _either_side, _bared,
-    _smaller_last, _dirt_last, _edges_apart,
+    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _flanked, _speckled, _of_body, _told_after, _either_side,
+    _bared, _smaller_last, _dirt_last, _edges_apart,
 )  # fmt: skip
 """What orders phrases, one after the other."""

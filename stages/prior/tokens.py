@@ -160,6 +160,7 @@ SIMILES = (
     (rf"\b((?:dark |light |pale )?(?:{HUES})) over ((?:dark |light |pale )?(?:{HUES}))(?=$|[,;.]| with | and )",
      r"\2, upper half \1"),  # "a helicopter, red over white"
     (r"\b(?:hanging|dangling|sprouting|rising|protruding|sticking out|hung) (?:from|out of|off) (?=the |its )", "at "),
+    (r"(?<=carved )((?:from|out of) [a-z ]+? )with an? [a-z-]+\b", r"\1"),  # "carved from a log with a chainsaw"
     (rf"\b({HUES}) as " + NOUNS, r"\1"),  # "legs black as coal"
     (r"\b(?:(?:in|of) )?(?:the )?(?:exact |same |deep |rich |dark |pale )?(?:colou?r|shade|hue|tint|tone) of " + NOUNS,
      r"\1 coloured"),  # "the colour of honey"
@@ -414,6 +415,8 @@ def _resolved(found: list[Token]) -> list[Token]:
     result: list[Token] = []
     for number, token in enumerate(found):
         ahead = _run(found[number + 1 :])
+        if token.text in METALLIC and any(t.kind == "substance" and KNOWN[t.text][0].look in HAIRY for t in ahead[:2]):
+            token = token._replace(kind="color", text=METALLIC[token.text], value=None)  # "golden fur"
         behind = _run(reversed(result))
         names = {t.kind for t in ahead} & {"substance", "thing"}
         if token.text == "left" and ahead and ahead[0].kind in ("finish", "weather"):
@@ -421,7 +424,9 @@ def _resolved(found: list[Token]) -> list[Token]:
         if token.text in ("straw", "reed", "reeds") and any(t.text.startswith("thatch") for t in (*behind, *ahead)):
             continue  # "thatched straw"
         dyed = token.kind == "thing" and token.text in COLORS and not (token.article or ahead)
-        if dyed and result and result[-1].text == "in":
+        after = bool(behind) and all(t.kind in ("finish", "color") for t in behind)
+        named = after and any(t.kind == "thing" for t in result)  # "a beetle, glossy chestnut"
+        if dyed and result and (result[-1].text == "in" or named):
             token = token._replace(kind="color", value=None)  # "a mesh upper in lemon"
         elif token.text in TIMBER and _of_timber(token.text, ahead[:2]):
             token = Token("substance", f"{token.text} wood")  # "ash legs", "a cherry table"
@@ -454,6 +459,10 @@ def _resolved(found: list[Token]) -> list[Token]:
         result.append(token)
     return result
 
+
+METALLIC = {"golden": "golden tan", "silver": "light grey", "copper": "copper colored", "bronze": "golden brown"}
+HAIRY = ("fur", "skin", "feathers", "straw")
+"""Metals that lend their colour to what stands after them, and the looks of what has it."""
 
 TIMBER = ("ash", "cherry", "chestnut")
 """Trees whose names mean something else, too."""
