@@ -18,6 +18,7 @@ from scipy.ndimage import minimum_filter
 from stages.bake.raster import Layout, touched_texels
 from stages.bake.studio import COLUMNS, EXPOSURE, FOV_Y, backdrop, cameras
 from stages.core.artifact import Artifact
+from stages.core.brdf import rougher
 from stages.core.color import srgb_encode
 from stages.core.frames import camera_rays, tangent_frame
 from stages.core.images import labelled
@@ -282,15 +283,6 @@ def _volume(a, b, c):  # type: ignore[no-untyped-def]
     """(a x b) · c."""
     x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
     return x * c[0] + y * c[1] + z * c[2]
-
-
-def rougher(roughness: NDArray[np.float32], spread: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Roughness of a patch whose normals differ by `spread`, a variance of slopes.
-
-    Source: Toksvig 2005, "Mipmapping Normal Maps"; for GGX, alpha² grows by twice the variance: Kaplanyan et al. 2016,
-    "Filtering Distributions of Normals for Shading Antialiasing".
-    """
-    return np.minimum(roughness**4 + 2 * spread, 1) ** np.float32(0.25)
 
 
 def material_cells(picture: Picture) -> list[NDArray[np.float32]]:

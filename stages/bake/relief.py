@@ -3,6 +3,7 @@
 The height of each texel is differenced within its own chart only, over the UV layout, and its gradient is carried into
 space by the triangle's own Jacobian: mirrored, turned or stretched UVs give the same relief. The surface normal then
 leans by minus that gradient, and is written in the tangent frame that the reader will interpolate at this texel.
+By how much normals differ within a texel goes into its roughness (`material.relief.bend`).
 Source: Mikkelsen 2010, "Bump Mapping Unparametrized Surfaces on the GPU" (surface gradients, which add up); 2020,
 "Surface Gradient-Based Bump Mapping Framework".
 """
@@ -11,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.bake.raster import Layout, Surface
+from stages.core.brdf import roughened
 from stages.core.parallel import compiled, in_parallel, slices
 from stages.light.normal_maps import NormalMaps, frame
-from stages.material.relief import STEEPEST, gentle
+from stages.material.relief import STEEPEST, bend, gentle
 
 FAR = 4.0
 """A neighbouring texel farther off in space than this many of a texel's own steps lies beyond a fold of the chart."""
@@ -28,6 +30,7 @@ TOGETHER = 1 << 15
 
 def relief_normals(
     height: NDArray[np.float32],
+    roughness: NDArray[np.float32],
     surface: Surface,
     layout: Layout,
     charts: NDArray[np.int32],
@@ -38,7 +41,8 @@ def relief_normals(
     """The tangent-space normal map of a height map.
 
     Args:
-        height: (S, S) world units, on the texels of charts. surface: (S, S) the point of each texel. charts: (F,).
+        height: (S, S) world units, on the texels of charts. roughness: (S, S), raised in place where normals differ.
+        surface: (S, S) the point of each texel. charts: (F,).
         corners: world positions and unit normals of the triangles' corners, (F, 3, 3) each. frames: tangents of the
         corners. own: normal maps that the mesh already has, on which the relief lies.
     Returns:
@@ -49,6 +53,7 @@ def relief_normals(
     carry = inverse_steps(steps)
     slope = np.zeros((*height.shape, 2), np.float32)
     _slopes(height, surface.triangle, surface.barycentric, charts, layout.uv, positions, steps, slope)
+    _roughen(height, surface.triangle, charts, np.linalg.norm(steps, axis=1), roughness)
     result = np.zeros((*height.shape, 3), np.float32)
     result[..., 2] = 1
 
@@ -150,6 +155,23 @@ def _slopes(height, triangle, barycentric, charts, layout, positions, steps, slo
                 slope[i, j, 1] = (xx * yh - xy * xh) / determinant
             elif spread > 0:
                 slope[i, j, 0], slope[i, j, 1] = xh / spread, yh / spread
+
+
+@compiled
+def _roughen(height, triangle, charts, widths, roughness):  # type: ignore[no-untyped-def]
+    """Raise the roughness of texels all of whose neighbours are on their chart. widths: (F, 2) of a texel on each triangle."""
+    rows, columns = height.shape
+    for i in range(1, rows - 1):
+        for j in range(1, columns - 1):
+            f = triangle[i, j]
+            whole = f >= 0 and widths[f, 0] > 0 and widths[f, 1] > 0
+            for k in range(9):
+                g = triangle[i + k // 3 - 1, j + k % 3 - 1]
+                whole = whole and g >= 0 and charts[g] == charts[f]
+            if whole:
+                above, below = height[i - 1], height[i + 1]
+                spread = bend(above, height[i], below, (j - 1, j, j + 1), 1 / widths[f, 0], 1 / widths[f, 1])
+                roughness[i, j] = roughened(roughness[i, j], spread)
 
 
 @compiled

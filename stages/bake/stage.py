@@ -243,15 +243,17 @@ def bake_maps(
 
 
 def with_normals(subject: Subject, maps: Maps) -> Maps:
-    """The maps with the normal map of their height, which lies on the source's own where it has one."""
+    """The maps with the normal map of their height, which lies on the source's own where it has one; their roughness is raised,
+    in place, by what normals differ within a texel."""
     if maps.height is None:
         return maps
     mesh, touched = subject.mesh, subject.touched
     frames = world_frames(mesh, set(np.unique(triangle_parts(mesh)[subject.triangles]).tolist()))
+    corners, own = (subject.corners, mesh["normals"]), subject.scene.bumps
     normals = relief_normals(
-        maps.height, touched, subject.layout, mesh["charts"], (subject.corners, mesh["normals"]), frames, subject.scene.bumps
+        maps.height, maps.roughness, touched, subject.layout, mesh["charts"], corners, frames, own
     )  # fmt: skip
-    subject.pad(normals)
+    subject.pad(normals, maps.material)
     return replace(maps, normal=normals)
 
 

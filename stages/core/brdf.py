@@ -27,6 +27,21 @@ def alpha_from_roughness(roughness: Any) -> Any:
     return roughness * roughness
 
 
+def rougher(roughness: NDArray, spread: NDArray) -> NDArray:
+    """Roughness of patches whose normals differ by `spread`, a variance of slopes along one axis.
+
+    Source: Toksvig 2005, "Mipmapping Normal Maps"; for GGX, alpha² grows by twice the variance: Kaplanyan et al. 2016,
+    "Filtering Distributions of Normals for Shading Antialiasing".
+    """
+    return np.minimum(roughness**4 + 2 * spread, 1) ** np.float32(0.25)
+
+
+@inlined
+def roughened(roughness, spread):  # type: ignore[no-untyped-def]
+    """`rougher` of one patch."""
+    return math.sqrt(math.sqrt(min(roughness**4 + 2 * spread, 1.0)))
+
+
 @inlined
 def schlick_weight(cosine):  # type: ignore[no-untyped-def]
     """s = (1 - V·H)^5."""

@@ -5,6 +5,7 @@ same material, learnt once, can be baked flat or deep. """
 
 import numpy as np
 
+from stages.core.parallel import compiled
 from stages.material.surface import Array
 
 HIGHEST = 0.02
@@ -24,3 +25,27 @@ def gentle(gradient: Array, axis: int = -1) -> Array:
     """Gradients no longer than `STEEPEST`, their direction kept. Args: axis: of the components."""
     length = np.linalg.norm(gradient, axis=axis, keepdims=True)
     return gradient * np.minimum(1, STEEPEST / np.maximum(length, STEEPEST / 2))
+
+
+@compiled(inline="always")
+def bend(above, here, below, columns, across, down):  # type: ignore[no-untyped-def]
+    """Variance along one axis of the slopes within a texel, which its one normal does not tell; as the surface through its
+    neighbours' heights has it, slopes being spread evenly from one border to the other.
+
+    Source: Olano & Baker 2010, "LEAN Mapping" (variance of slopes, kept for roughness).
+
+    Args: three rows of heights. columns: of the texel's left neighbour, its own, the right one's. across, down: texels that
+    are as long as a unit of height.
+    """
+    left, middle, right = columns
+    twist = (below[right] - below[left] - above[right] + above[left]) / 4
+    changes = (
+        (here[left] + here[right] - 2 * here[middle]) * across,
+        (above[middle] + below[middle] - 2 * here[middle]) * down,
+        twist * across,
+        twist * down,
+    )
+    total = 0.0
+    for change in changes:
+        total += min(change * change, STEEPEST * STEEPEST)  # no slope is shown that is steeper
+    return total / 24  # of evenly spread values over the width squared 1/12, of two axes

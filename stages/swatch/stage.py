@@ -95,7 +95,7 @@ def flat(recipe: Recipe) -> Recipe:
 def tile(recipe: Recipe, size: int) -> Maps:
     """The maps of a settled recipe, tiling; height in edges of the square."""
     texels = swatch(recipe, size, cores()).texels
-    return Maps(texels[..., :5], texels[..., 5], tile_normals(texels[..., 5]))
+    return Maps(texels[..., :5], texels[..., 5], tile_normals(texels[..., 5], texels[..., 3]))
 
 
 def write_maps(out: Path, maps: Maps) -> list[str]:

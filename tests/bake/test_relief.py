@@ -10,7 +10,7 @@ from scipy.ndimage import binary_erosion
 
 from stages.asset.maps import Maps
 from stages.asset.traced import baked_bumps, world_frames
-from stages.bake.relief import _lean, lean_reference, own_gradient
+from stages.bake.relief import _lean, jacobians, lean_reference, own_gradient
 from stages.bake.stage import Subject, with_normals
 from stages.core.artifact import Artifact, load_npz
 from stages.core.schemas import PREP
@@ -173,3 +173,23 @@ def test_relief_adds_to_the_normal_map_that_is_there(tmp_path: Path) -> None:
     normal = with_normals(subject, Maps(np.zeros((SIZE, SIZE, 5), "f4"), height=height)).normal
     wanted = np.array([-0.75, -0.5, 1]) / np.linalg.norm([-0.75, -0.5, 1])
     np.testing.assert_allclose(normal[on], np.broadcast_to(wanted, (on.sum(), 3)), atol=2e-3)
+
+
+def test_what_normals_differ_by_within_a_texel_is_in_its_roughness(tmp_path: Path) -> None:
+    """A band of fine waves along u on a plate: rougher there by their curvature, seams included; elsewhere nothing changes."""
+    subject = subject_of(tmp_path, "grid")
+    on = subject.touched.triangle >= 0
+    points = subject.points(subject.touched.where(on))[0]
+    wave, high, waves = 0.03, 4e-3, points[:, 1] > 0.1
+    height = np.zeros(on.shape, np.float32)
+    height[on] = np.where(waves, high * np.sin(2 * np.pi / wave * points[:, 0]), 0)
+    material = np.full((SIZE, SIZE, 5), 0.25, np.float32)
+    found = with_normals(subject, Maps(material, height=height)).roughness[on]
+    texel = float(np.median(np.linalg.norm(jacobians(subject.layout, subject.corners), axis=1)))
+    k = 2 * np.pi / wave
+    curvature = high * k**2 * np.sin(k * points[:, 0]) * np.sinc(texel / wave) ** 2  # of a sine by differences
+    expected = (0.25**4 + curvature**2 * texel**2 / 12) ** 0.25
+    inside = waves & (points[:, 1] > 0.13) & (np.abs(points).max(1) < 0.45)
+    np.testing.assert_allclose(found[inside], expected[inside], atol=3e-3)
+    assert expected[inside].max() > 0.3
+    np.testing.assert_allclose(found[points[:, 1] < 0.07], 0.25, atol=1e-6)

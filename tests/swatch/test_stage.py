@@ -66,7 +66,7 @@ def test_a_material_of_known_words_needs_no_tensors(tmp_path: Path) -> None:
 
 def test_normals_lean_away_from_a_slope() -> None:
     height = np.tile(np.sin(2 * np.pi * np.arange(64) / 64).astype(np.float32) / 100, (64, 1))
-    normal = tile_normals(height)
+    normal = tile_normals(height, np.full_like(height, 0.5))
     assert normal[0, 0, 0] < -0.05 and normal[0, 32, 0] > 0.05 and abs(normal[..., 1]).max() < 1e-6
 
 
@@ -76,7 +76,7 @@ def test_normals_and_means_are_those_of_the_obvious_form() -> None:
     slope = np.stack([np.roll(height, -1, 1) - np.roll(height, 1, 1), np.roll(height, 1, 0) - np.roll(height, -1, 0)], -1) * 48
     leaning = np.concatenate([-gentle(slope), np.ones((96, 96, 1))], -1)
     leaning /= np.linalg.norm(leaning, axis=-1, keepdims=True)
-    np.testing.assert_allclose(tile_normals(height), leaning, atol=3e-6)
+    np.testing.assert_allclose(tile_normals(height, np.full_like(height, 0.5)), leaning, atol=3e-6)
     maps = rng.random((96, 96, 6)).astype(np.float32)[..., :5]
     blocks = maps[:95, :95].reshape(19, 5, 19, 5, 5).mean((1, 3))
     np.testing.assert_allclose(shrunk(maps, 19), blocks, atol=1e-6)
