@@ -67,7 +67,8 @@ class Cells:
             gathered = _gathered(corners[whole].mean(1), scene.geometric_normal(np.flatnonzero(whole)), width)
             groups = int(gathered.max(initial=-1)) + 1
             if groups + int((cuts[~whole] ** 2).sum()) <= MOST:
-                return _numbered(scene, cuts, gathered, groups, area, width)
+                away = _from_middle(corners[whole].mean(1), area[whole], gathered)
+                return _numbered(scene, cuts, gathered, groups, away, width)
             width *= BOLDER
 
     def __len__(self) -> int:
@@ -126,13 +127,24 @@ def _first_seen(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[
     return triangle[best, cell], barycentric[best, cell]
 
 
-def _numbered(scene: Scene, cuts: NDArray, gathered: NDArray, groups: int, area: NDArray, width: float) -> Cells:
-    """Cells of groups first, each stood for by its largest triangle that is seen, then those of cut triangles."""
+def _from_middle(centre: NDArray, area: NDArray, group: NDArray) -> NDArray[np.float64]:
+    """How far small triangles lie from the middle of their group, squared; those without an area farthest."""
+    whole = np.maximum(np.bincount(group, area), np.finfo(float).tiny)
+    middle = np.stack([np.bincount(group, area * centre[:, k]) / whole for k in range(3)], -1)
+    return np.where(area > 0, np.square(centre - middle[group]).sum(-1), np.inf)
+
+
+def _numbered(scene: Scene, cuts: NDArray, gathered: NDArray, groups: int, away: NDArray, width: float) -> Cells:
+    """Cells of groups first, then those of cut triangles.
+
+    A group is stood for by the triangle in its middle, or where that is not seen by another, ever farther from it.
+    Args: away: of `_from_middle`.
+    """
     whole, cut = np.flatnonzero(cuts == 1), np.flatnonzero(cuts > 1)
     first = np.zeros(len(cuts), np.int64)
     first[whole] = gathered
     first[cut] = groups + np.cumsum(cuts[cut] ** 2) - cuts[cut] ** 2
-    order = np.lexsort((whole, -area[whole], gathered))
+    order = np.lexsort((whole, away, gathered))
     start = np.unique(gathered[order], return_index=True)[1]
     count = np.diff(start, append=len(whole))
     parts = cut.repeat(cuts[cut] ** 2)
@@ -140,7 +152,8 @@ def _numbered(scene: Scene, cuts: NDArray, gathered: NDArray, groups: int, area:
     along = np.concatenate([np.ones(groups, np.int64), cuts[parts]])
     triangles, places = [], []
     for k in range(len(PLACES)):
-        triangles.append(np.concatenate([whole[order[start + k % count]], parts]).astype(np.int32))
+        farther = np.where(count < len(PLACES), k % count, k * count // len(PLACES))
+        triangles.append(np.concatenate([whole[order[start + farther]], parts]).astype(np.int32))
         place = PLACES[np.concatenate([k // count, np.full(len(parts), k)])]
         places.append(_part_points(number, along, place).astype(np.float32))
     triangle, barycentric = _first_seen(scene, np.stack(triangles), np.stack(places))

@@ -61,6 +61,19 @@ def quads(*corners: NDArray) -> Scene:
     return Scene(vertices, triangles, flat_normals(vertices, triangles))
 
 
+def cut(scene: Scene, parts: int) -> Scene:
+    """The same surface with each triangle in parts² equal ones."""
+    i, j = np.nonzero(np.tri(parts, dtype=bool)[::-1])  # corners on a triangular grid: i + j < parts
+    up = np.stack([[i, j], [i + 1, j], [i, j + 1]])
+    down = np.stack([[i + 1, j], [i + 1, j + 1], [i, j + 1]])[..., i + j < parts - 1]
+    b = np.concatenate([up, down], 2) / parts  # corner, first or second coordinate, part
+    a, b1, b2 = (scene.vertices[scene.triangles[:, k], None, None] for k in range(3))
+    x, y = b[:, 0].T[..., None], b[:, 1].T[..., None]
+    corners = (a + x * (b1 - a) + y * (b2 - a)).reshape(-1, 3)
+    triangles = np.arange(len(corners)).reshape(-1, 3)
+    return Scene(corners, triangles, flat_normals(corners, triangles))
+
+
 def view_of(scene: Scene, size: int, eye: tuple[float, float, float] = (2.2, 1.5, 1.3)) -> GBuffer:
     """The scene from a corner of the room, `size` pixels square."""
     c2w = look_at(np.array(eye), np.zeros(3), np.array([0.0, 0.0, 1.0]))

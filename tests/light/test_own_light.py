@@ -241,6 +241,17 @@ def test_touching_pieces_are_lit_as_the_one_that_they_make() -> None:
     assert percent(parts, whole) < 0.1
 
 
+def test_a_million_triangles_are_lit_as_the_few_that_they_lie_in() -> None:
+    """The corner, each of its 18 triangles cut in 62,500: as many cells, and the same light between them."""
+    few = scenes.box_in_corner()
+    many = scenes.cut(few, 250)
+    assert len(many.triangles) == 1_125_000 and len(Cells.of(many, 4 * FEW)) < 2 * len(Cells.of(few, 4 * FEW)) < MOST
+    light = scenes.sunny_light(20.0, 16)
+    (_, exact), (direct, found) = (shaded(scene, scenes.view_of(scene, 24), light, WHITE, 2) for scene in (few, many))
+    assert percent(found, exact) < 0.5 < 0.2 * percent(direct, exact)
+    assert found.mean() == pytest.approx(exact.mean(), rel=0.005)
+
+
 def test_every_point_lies_in_its_cell() -> None:
     """The point that stands for a cell is found in it, and there are no more cells than numbers for them."""
     for scene in (scenes.box_in_corner(), scenes.sphere(4)):
