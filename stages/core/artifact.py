@@ -394,8 +394,11 @@ def write_exr(
     display: tuple[int, int] | None = None,
     offset: tuple[int, int] = (0, 0),
     attributes: Mapping[str, str] | None = None,
+    quickly: bool = False,
 ) -> None:
-    """Write named channels as one scan-line EXR, atomically, ZIP-compressed.
+    """Write named channels as one scan-line EXR, atomically and without loss.
+
+    By ZIP, or quickly by PIZ: half floats of light in half to two thirds of the time, read in as much, but 2 to 14 % larger.
 
     Args:
         channels: name -> (h, w) float16 or float32, all of one shape.
@@ -406,7 +409,7 @@ def write_exr(
     rows, columns = display or (h, w)
     (top, left) = offset
     header = {
-        "compression": OpenEXR.ZIP_COMPRESSION,
+        "compression": OpenEXR.PIZ_COMPRESSION if quickly else OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "dataWindow": (np.array([left, top], "i4"), np.array([left + w - 1, top + h - 1], "i4")),
         "displayWindow": (np.array([0, 0], "i4"), np.array([columns - 1, rows - 1], "i4")),

@@ -168,7 +168,7 @@ def _write_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], value
     image = np.zeros((values.shape[1], *inside.shape), np.float16)
     image[:, inside] = rounded(values, plain).T.contiguous().numpy()
     channels = dict(zip(names, image, strict=True))
-    _write(path, channels, mask.shape, window, {"dreammat_scale": repr(scale)})
+    _write(path, channels, mask.shape, window, {"dreammat_scale": repr(scale)}, quickly=True)
 
 
 def rounded(values: Tensor, plain: int) -> Tensor:
@@ -219,8 +219,9 @@ def _write(
     display: tuple[int, ...],
     window: tuple[slice, slice],
     attributes: dict[str, str],
+    quickly: bool = False,
 ) -> None:
-    write_exr(path, channels, (display[0], display[1]), (window[0].start, window[1].start), attributes)
+    write_exr(path, channels, (display[0], display[1]), (window[0].start, window[1].start), attributes, quickly)
 
 
 def _expect(path: Path, image: ExrImage, names: list[str]) -> None:

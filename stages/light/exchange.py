@@ -89,7 +89,7 @@ class Between:
     @staticmethod
     def of(scene: Scene, environments: list[Environment], seed: int, bounces: int) -> "Between | None":
         """None where the object sees next to nothing of itself."""
-        if scene.outermost[:, 0].all():
+        if not scene.horizons.front.any():
             return None
         cells = Cells.of(scene)
         exchange = make_exchange(scene, cells, environments, seed, bounces)

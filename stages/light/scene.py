@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from stages.light import hit_kernels
 from stages.light.emission import Emission
+from stages.light.horizon import Horizons
 from stages.light.normal_maps import NormalMaps
-from stages.light.outermost import outermost
 
 OFFSET = 2e-5
 """Distance by which a secondary ray's origin is lifted off the surface, in world units (object size 1)."""
@@ -94,10 +94,10 @@ class Scene:
             self._any = _Tree(vertices, triangles, robust=False)
 
     @functools.cached_property
-    def outermost(self) -> NDArray[np.bool_]:
-        """Whether nothing stands over a triangle's plane, in front of it and behind it: (F, 2)."""
-        others = np.zeros((0, 3), np.float32) if self._casters is None else self._casters[0]
-        return outermost(self.vertices, self.triangles, others)
+    def horizons(self) -> Horizons:
+        """How high anything stands around its triangles."""
+        others = self._casters or (np.zeros((0, 3), np.float32), np.zeros((0, 3), np.int32))
+        return Horizons(self.vertices, self.triangles, self._flat_normals, others)
 
     def intersect(self, origins: NDArray, directions: NDArray) -> Hits:
         """Closest hit of each ray. Args: (R, 3) each; directions need not be unit: t is in their length."""

@@ -15,8 +15,7 @@ every term, every roughness and every environment:
 - what rises above the bound (a sun, a lamp) has rays of its own, aimed at what the point would reflect most of, and
   combined with the lobe rays by the same balance heuristic, so neither a tiny sun nor a sharp lobe sparkles. What lobe rays
   see of it is divided by their weights like the rest: a lobe narrower than a lamp shows little more than the lamp;
-- where nothing at all stands over the plane of a point's triangle, as on what is convex, no ray is traced
-  (`stages.light.outermost`);
+- a ray that rises over all that stands around its point's triangle is open, and not traced (`stages.light.horizon`);
 - neighbouring pixels use complementary samples; the points that turn out noisiest trace more, towards the lights that make
   them so; and what noise is left is averaged over neighbours that do not differ by more than it
   (`stages.light.reconstruction`), less the highlights that a lamp would make in the open (`stages.light.highlights`), which
@@ -48,6 +47,7 @@ from stages.light.cells import Cells
 from stages.light.ends import Ends, find_ends
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
+from stages.light.horizon import WALL
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
 from stages.light.terms import GLTF, Terms
@@ -282,6 +282,7 @@ def trace(
     mean, gap = np.empty((2, len(points.n), terms.stored, CHANNELS), np.float32)
     rays = Rays.plan(quality, lights, seed, terms)
     pixel, order = tiles(points.mask)
+    scene.horizons.meet(points.triangle)
     with ThreadPoolExecutor(cores()) as pool:
         parts = [order[start : start + TILE] for start in range(0, len(order), TILE)]
         given, sums = (scene, points, lights, terms, rays), (mean, gap)
@@ -338,18 +339,20 @@ def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", occluded: ND
     return find_ends(scene, cells, len(drawn.row), found, drawn.origin[ray], drawn.direction[ray])
 
 
-OUTER = 0.1
-"""Least share of a tile's points that lie outermost for which rays are sorted."""
+OPEN = 0.1
+"""Least share of open sectors over a tile's points for which rays are sorted."""
 
 
 def blocked(scene: Scene, points: GBuffer, part: NDArray, drawn: "Drawn") -> NDArray[np.bool_]:
-    """Which rays (R,) of a tile anything blocks; those are not traced that rise where nothing stands over the plane."""
-    ng, triangle = points.ng[part], points.triangle[part]
-    behind = (ng * scene.geometric_normal(triangle)).sum(-1) < 0
-    outer = scene.outermost[triangle, behind.astype(np.int64)]
-    if outer.mean() < OUTER:
+    """Which rays (R,) of a tile anything blocks; those are not traced that rise over their triangle's horizon."""
+    ng, triangle, horizons = points.ng[part], points.triangle[part], scene.horizons
+    front = scene.geometric_normal(triangle)
+    horizon = horizons.front[triangle]
+    behind = (ng * front).sum(-1) < 0
+    horizon[behind] = horizons.behind[triangle[behind], None]
+    if (horizon < WALL).mean() < OPEN:
         return scene.occluded(drawn.origin, drawn.direction)
-    asked = np.flatnonzero(to_trace(drawn.direction, drawn.row, ng, outer))
+    asked = np.flatnonzero(to_trace(drawn.direction, drawn.row, (*tangent_frame(front), ng), horizon))
     result = np.zeros(len(drawn.direction), np.bool_)
     result[asked] = scene.occluded(drawn.origin[asked], drawn.direction[asked])
     return result

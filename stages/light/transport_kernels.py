@@ -10,6 +10,7 @@ from stages.core.lanes import LANES, fill, floor, larger, load, root, smaller, s
 from stages.core.parallel import compiled
 from stages.light.blender import F0, burley, fresnel
 from stages.light.environment import bilinear
+from stages.light.horizon import WALL, sector_of
 from stages.light.light_set import CELLS, CHANNELS, FINE, SQUARE
 
 CLASSES = 64
@@ -279,20 +280,25 @@ def _settle(towards, leaves, origin):  # type: ignore[no-untyped-def]
 
 
 @fast
-def to_trace(direction, row, ng, outer):  # type: ignore[no-untyped-def]
-    """Which rays (R,) may meet something: all but those that rise from points over whose plane there is nothing.
+def to_trace(direction, row, frame, horizon):  # type: ignore[no-untyped-def]
+    """Which rays (R,) may meet something: all but those that rise over the horizon of their point.
 
     Args:
-        direction: (R, 3). row: (P, S) of a `Drawn`. ng: (P, 3). outer: (P,) bool.
+        direction: (R, 3). row: (P, S) of a `Drawn`. frame: (P, 3) each, two tangents of the triangles, and their normals to the
+        side of the rays. horizon: (P, SECTORS) of `Horizons`.
     """
+    t, b, n = frame
     result = np.ones(len(direction), np.bool_)
     for p in range(len(row)):
-        if outer[p]:
+        if horizon[p].min() < WALL:
             for s in range(row.shape[1]):
                 r = row[p, s]
                 if r >= 0:
-                    cosine = direction[r, 0] * ng[p, 0] + direction[r, 1] * ng[p, 1] + direction[r, 2] * ng[p, 2]
-                    result[r] = cosine <= np.float32(0)
+                    x, y, z = direction[r, 0], direction[r, 1], direction[r, 2]
+                    height = (x * n[p, 0] + y * n[p, 1] + z * n[p, 2]) * np.float32(WALL)
+                    along = x * t[p, 0] + y * t[p, 1] + z * t[p, 2]
+                    across = x * b[p, 0] + y * b[p, 1] + z * b[p, 2]
+                    result[r] = height <= np.float32(horizon[p, sector_of(along, across)])
     return result
 
 
