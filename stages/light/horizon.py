@@ -107,7 +107,8 @@ class Horizons:
     def _build(self) -> tuple[Mesh, Tree]:
         vertices, triangles, normals = self._own
         corners = np.concatenate([vertices[triangles], self._others[0][self._others[1]]]).astype(np.float64)
-        axes = np.stack([*tangent_frame(normals), normals], 1).astype(np.float64) * normals.any(-1)[:, None, None]
+        axes = np.stack([*tangent_frame(normals), normals], 1).astype(np.float64)
+        axes[~np.asarray(normals.any(-1))] = 0
         centre = corners.mean(1)
         radius = np.linalg.norm(corners - centre[:, None], axis=-1).max(1)
         return Mesh(corners, axes, np.c_[centre, radius]), tree_of(corners)
