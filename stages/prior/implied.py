@@ -37,7 +37,8 @@ def _patterned(phrases: list[Phrase]) -> None:
         first.region, first.where = None, ""
 
 
-PLAIN_PATTERNS = ("striped", "stripes", "spotted", "spots", "dotted", "polka dot", "polka dots")
+PLAIN_PATTERNS = ("speckled", "flecked", "mottled", "dappled", "striped", "stripes", "spotted", "spots", "dotted",
+                  "polka dot", "polka dots")
 
 
 def _listed(phrases: list[Phrase]) -> None:

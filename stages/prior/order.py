@@ -162,7 +162,8 @@ def _told_after(first: Phrase, over: list[Phrase]) -> Order:
 
 def _on_ground(thing: Phrase, over: list[Phrase]) -> Order | None:
     """The stuff on which all that was named before lies, if any does: "a mailbox, icicles and frost on blue paint"."""
-    beneath = [p.join.kind in ("on", "over") and p.join.beneath and bool(p.substance or p.unknown) for p in over]
+    laid_on = ("on", "over", "cover", "partly")  # "a chest, barnacle-crusted oak"
+    beneath = [p.join.kind in laid_on and p.join.beneath and bool(p.substance or p.unknown) for p in over]
     at = beneath.index(True) if any(beneath) else 0
     laid = all(gathering(p.substance) or p.coats or p.part or p.where in SHAPES for p in over[:at])
     if not at or over[at].region or not laid:

@@ -226,6 +226,8 @@ class Reading:
             return PARTS["roof"]
         if (phrase.part or (phrase.thing and phrase.join.beneath)) and phrase.join.kind == "on":
             return PARTS["stand"]  # "a cannon on a wooden carriage"
+        if phrase.thing and phrase.colors and _lives(phrase.thing) and phrase.join.kind in BESIDE:
+            return SHAPES["motifs"]  # "a kimono with gold cranes"
         if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
             return DETAILS
         return JOINED.get(phrase.join.kind, JOINED["with"])
@@ -254,7 +256,7 @@ class Reading:
         if of_part:
             return self._of(stuff(of_part, True), phrase)
         horny = phrase.animal in SHELLED and not beneath
-        if made and not horny and not (phrase.colors and beneath is not None and _solid(split(made)[0])):
+        if made and not horny and not (phrase.colors and beneath is not None and _drawn(split(made)[0], beneath)):
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
             inner.weather, inner.region, inner.where = phrase.weather, None, ""
@@ -437,9 +439,21 @@ def _kin(phrase: Phrase, usual: Phrase) -> bool:
     return _family(usual) == _family(phrase) != "stone" and (pelt or phrase.substance in GENERIC)
 
 
-def _solid(made: Phrase) -> bool:
-    """Whether a thing is of stone or metal, which a part of it that has its name and another colour need not be."""
-    return bool(made.substance) and KNOWN[made.substance][0].family in ("metal", "stone", "gem")
+def _drawn(made: Phrase, beneath: Coat) -> bool:
+    """Whether what is named on a thing, with its colour, is not of its own stuff there: the keys of a toy, cranes on silk."""
+    kind = KNOWN[made.substance][0].family if made.substance else ""
+    alive = bool(made.substance) and KNOWN[made.substance][0].look in LIVING
+    return kind in ("metal", "stone", "gem") or (alive and _family_of(beneath.look) != "organic")
+
+
+LIVING = ("fur", "feathers", "leaves", "scales", "skin", "velvet", "tomato skin")
+"""Looks of beasts and plants."""
+
+
+def _lives(thing: str) -> bool:
+    """Whether a thing is a beast or a plant, which on another thing is a picture."""
+    made = split(OBJECTS[thing].made)[0].substance
+    return bool(made) and KNOWN[made][0].look in LIVING
 
 
 def strands(phrase: Phrase) -> bool:

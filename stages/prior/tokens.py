@@ -91,6 +91,7 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     for simile, meant in SIMILES:
         plain = re.sub(simile, meant, plain)
     plain = re.sub(LIKENESS, _likened, plain)
+    plain = re.sub(r"\b(on|at|along|around|near|over|inside|across) (the|its) ([a-z]+) ([a-z]+)\b", _at_part, plain)
     plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
     heard = re.findall(r"#[0-9a-f]{6}\b|[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
     found: list[Token] = []
@@ -143,6 +144,14 @@ def _likened(found: re.Match[str]) -> str:
     return f" {found[1]} coloured" if token and token.kind == "thing" else found[0]
 
 
+def _at_part(found: re.Match[str]) -> str:
+    """Where something is, without what else the place is: "on the broken edge"."""
+    at, the, which, part = found.groups()
+    known = _table()[0].get(which)
+    plain = f"{at} {the} {part}" in _table()[0] and (known is None or known.kind == "filler")
+    return f"{at} {the} {part}" if plain and f"{which} {part}" not in _table()[0] else found[0]
+
+
 ARTICLES = {"a": "a", "an": "a", "the": "the"}
 
 TURNED = (r"((?:sun-?|rain-?|smoke-?|age-?)?(?:weathered|greyed|grayed|aged|bleached|darkened|yellowed|seasoned|silvered|"
@@ -155,6 +164,9 @@ HANDS = ("rain|sun|sunlight|age|time|years|use|decades|centuries|weather|wind|se
 NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on )"
 SIMILES = (
     (r"\bas (?!well|soon|long|much|many|far)([a-z]+(?:-[a-z]+)?) as " + NOUNS, r"\1"),  # "as black as a raven's wing"
+    (r"\bhalf[- ](?=(?:melted|eaten|peeled|rotten|rotted|burnt|burned|charred|opened|broken|ruined|frozen|faded|rusted)\b)",
+     "partly "),
+    (r"\b[a-z]+[- ]shaped\b(?! (?:like|as|into))", ""),  # "a leaf shaped blade"
     (r"\b(?:shaped|formed|sculpted|modelled|modeled) (?:like|as|into) " + NOUNS, ""),  # "a jug shaped like a pineapple"
     (r"\bin the (?:shape|form) of " + NOUNS, ""),
     (rf"\b((?:dark |light |pale )?(?:{HUES})) over ((?:dark |light |pale )?(?:{HUES}))(?=$|[,;.]| with | and )",
@@ -174,7 +186,8 @@ SIMILES = (
     (r",? half[- ](?:dipped|submerged|buried) in\b", ", lower half"),
     (r"(?:,| with| in)(?: an?)? ((?:light |dark |medium |warm |deep |rich )?)"
      r"(?!coffee|water|blood|rust|grass|oil|wine|ink|tea|dirt)([a-z]+) stain\b", r", \1\2 coloured"),
-    (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot)\b", r"with a \1\2 at the lower third"),
+    (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot|holder|saucer)\b",
+     r"with a \1\2 at the lower third"),
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
     (r"\b(?:burnt|burned|scorched|charred) and blackened\b", "charred"),
     (r"\bblackened (?=at|on|along|around|near|in)", "charred "),
@@ -415,6 +428,8 @@ def _resolved(found: list[Token]) -> list[Token]:
     result: list[Token] = []
     for number, token in enumerate(found):
         ahead = _run(found[number + 1 :])
+        if token.text in SHIMMERING and any(t.kind in ("substance", "color", "thing") for t in ahead):
+            continue  # "iridescent emerald scales"
         if token.text in METALLIC and any(t.kind == "substance" and KNOWN[t.text][0].look in HAIRY for t in ahead[:2]):
             token = token._replace(kind="color", text=METALLIC[token.text], value=None)  # "golden fur"
         behind = _run(reversed(result))
@@ -459,6 +474,9 @@ def _resolved(found: list[Token]) -> list[Token]:
         result.append(token)
     return result
 
+
+SHIMMERING = ("iridescent", "holographic", "opalescent", "prismatic")
+"""Words that say what a part is of where nothing else does."""
 
 METALLIC = {"golden": "golden tan", "silver": "light grey", "copper": "copper colored", "bronze": "golden brown"}
 HAIRY = ("fur", "skin", "feathers", "straw")
