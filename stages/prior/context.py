@@ -236,7 +236,7 @@ def _ground_of(phrase: Phrase, before: Phrase) -> bool:
 def _glazes(glaze: Phrase, before: Phrase) -> bool:
     """Whether a clear coat is that of the whole: one without colour, or of one colour on what has none."""
     whole = not glaze.region and (not before.region or before.join is FIRST)
-    dyes = not before.colors and all(word in COLORS for word in glaze.colors if is_hue(word))
+    dyes = not before.colors and all(word in COLORS or family(word) == "gem" for word in glaze.colors if is_hue(word))
     return whole and (not glaze.colors or dyes)
 
 

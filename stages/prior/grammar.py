@@ -11,7 +11,7 @@ from stages.prior.colors import COLORS
 from stages.prior.context import understood
 from stages.prior.motifs import PAINTS
 from stages.prior.objects import OBJECTS
-from stages.prior.phrases import FIRST, Phrase, family, is_hue
+from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
 from stages.prior.places import CLOTHES, DETAILS, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import PAINTED, Join, Token, tokens_of
@@ -160,7 +160,9 @@ def _begins(token: Token, now: Phrase) -> bool:
 def _dresses(after: Sequence[Token]) -> bool:
     """Whether what follows is worn, or holds it, and has a colour or stuff of its own."""
     run = list(takewhile(lambda token: token.kind not in ("join", "comma", "half", "postfix"), after))
-    return any(token.kind == "part" and token.text in (*CLOTHES, *HOLDERS) for token in run) and len(run) > 1
+    return any(token.kind == "part" and token.text in (*CLOTHES, *HOLDERS) for token in run) and (
+        len(run) > 1 or (len(after) > 1 and after[1].text == "of")
+    )
 
 
 HOLDERS = ("frame", "frames", "casing", "case", "housing", "stand", "mount", "enclosure", "scabbard", "sheath")
@@ -193,6 +195,8 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         said = phrase.of_kind(kind)
         if text not in said:
             said.append(text)
+    elif kind == "part" and phrase.thing and phrase.join is FIRST and text in OBJECTS and lives(phrase.thing):
+        phrase.thing = text  # "a hobbit door"
     elif kind == "part" and phrase.thing and phrase.join is FIRST:
         return  # "a bicycle frame" is all frame
     elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.says_what:
@@ -272,7 +276,7 @@ def _name(phrase: Phrase, text: str) -> None:
     elif old in ("painted", "powder-coated", "powder coated") and family(text) in ("metal", "wood"):
         phrase.substance = f"painted {family(text)}"  # "painted yellow metal", "powder-coated black steel"
         phrase.colors += [word for word in text.split(" ") if word in COLORS and not phrase.colors]
-    elif KNOWN[old][0].look == KNOWN[text][0].look and old not in GENERIC:
+    elif KNOWN[text][0].look in (KNOWN[old][0].look, KNOWN[old][0].look.split(" ")[-1]) and old not in GENERIC:
         return  # "thatched straw"
     elif text == "shell" and family(old) in ("plastic", "metal", "paint"):
         return  # "a plastic shell"

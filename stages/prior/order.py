@@ -127,6 +127,8 @@ def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     if at is None:
         return first, over
     body, others = over[at], [*over[:at], *over[at + 1 :]]
+    if body.color_only and set(body.weather) & PEELS:
+        body = replace(body, substance="paint")  # "an iron bench with peeling turquoise slats"
     if body.coats and first.substance and not (first.region or first.coats or first.substance in ROOFING):
         return replace(body, thing=first.thing, shows=replace(first), weather=[*first.weather, *body.weather]), others
     if body.color_only and (first.substance or first.unknown) and not (first.colors or first.region):
@@ -278,7 +280,9 @@ def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     for phrase in over:
         for part in (phrase, phrase.within):
             if part and (part.where or part.part or not part.region):
-                part.region = places.get((part.where or part.part or part.substance).split(" ")[-1], part.region)
+                names = [part.where or part.part] if part.where or part.part else [part.thing, part.substance]
+                found = (places.get(name.split(" ")[-1]) for name in names if name)
+                part.region = next(filter(None, found), part.region)
     return first, over
 
 

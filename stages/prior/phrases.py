@@ -4,6 +4,7 @@ from collections.abc import Container
 from dataclasses import dataclass, field
 
 from stages.prior.colors import COLORS
+from stages.prior.objects import OBJECTS
 from stages.prior.places import Region
 from stages.prior.stuffs import COATINGS, KNOWN
 from stages.prior.tokens import Join
@@ -87,6 +88,16 @@ class Phrase:
 def is_hue(word: str) -> bool:
     """Whether a word of colour is a colour of itself, not a change of one."""
     return word in COLORS or word in KNOWN or word.startswith("#")
+
+
+LIVING = ("fur", "feathers", "leaves", "scales", "skin", "velvet", "tomato skin")
+"""Looks of beasts and plants."""
+
+
+def lives(thing: str) -> bool:
+    """Whether a thing is a beast or a plant, by the last word of what it is made of."""
+    made = OBJECTS[thing].made.split(" with ")[0].split(" ")[-1]
+    return made in KNOWN and KNOWN[made][0].look in LIVING
 
 
 def family(name: str) -> str:

@@ -23,7 +23,7 @@ from stages.prior.implied import BURNT
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
 from stages.prior.order import ROOFING, in_its_places, ordered
-from stages.prior.phrases import Phrase, is_hue
+from stages.prior.phrases import LIVING, Phrase, is_hue, lives
 from stages.prior.places import (
     ANIMALS,
     CORRODES,
@@ -226,7 +226,7 @@ class Reading:
             return PARTS["roof"]
         if (phrase.part or (phrase.thing and phrase.join.beneath)) and phrase.join.kind == "on":
             return PARTS["stand"]  # "a cannon on a wooden carriage"
-        if phrase.thing and phrase.colors and _lives(phrase.thing) and phrase.join.kind in BESIDE:
+        if phrase.thing and phrase.colors and lives(phrase.thing) and phrase.join.kind in BESIDE:
             return SHAPES["motifs"]  # "a kimono with gold cranes"
         if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
             return DETAILS
@@ -446,15 +446,6 @@ def _drawn(made: Phrase, beneath: Coat) -> bool:
     return kind in ("metal", "stone", "gem") or (alive and _family_of(beneath.look) != "organic")
 
 
-LIVING = ("fur", "feathers", "leaves", "scales", "skin", "velvet", "tomato skin")
-"""Looks of beasts and plants."""
-
-
-def _lives(thing: str) -> bool:
-    """Whether a thing is a beast or a plant, which on another thing is a picture."""
-    made = split(OBJECTS[thing].made)[0].substance
-    return bool(made) and KNOWN[made][0].look in LIVING
-
 
 def strands(phrase: Phrase) -> bool:
     """Whether a phrase is of something long and thin, which lies around a thing."""
@@ -479,7 +470,7 @@ def _painted(made: Phrase) -> str:
         return made.substance
     named, usual = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (_color(made), own.color))
     grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH) and named[0] < WHITE
-    same = own.family == "wood" and float(np.linalg.norm(named - usual)) < SIMILAR
+    same = own.family == "wood" and float(np.linalg.norm(named - usual)) < SIMILAR and named[1] > -GREYISH / 2  # nor green
     return made.substance if grey or same else "painted wood" if own.family == "wood" else "painted metal"
 
 

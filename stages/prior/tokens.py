@@ -161,9 +161,10 @@ HANDS = ("rain|sun|sunlight|age|time|years|use|decades|centuries|weather|wind|se
          "fire|generations|elements|heat|washing|feet|footsteps|sweat")
 """Words of what becomes of a stuff, the colours that it may take, and who does it."""
 
-NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on )"
+NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on | in | that | which )"
 SIMILES = (
     (r"\bas (?!well|soon|long|much|many|far)([a-z]+(?:-[a-z]+)?) as " + NOUNS, r"\1"),  # "as black as a raven's wing"
+    (r"\boil[- ]painted\b", "painted"),
     (r"\bhalf[- ](?=(?:melted|eaten|peeled|rotten|rotted|burnt|burned|charred|opened|broken|ruined|frozen|faded|rusted)\b)",
      "partly "),
     (r"\b[a-z]+[- ]shaped\b(?! (?:like|as|into))", ""),  # "a leaf shaped blade"
@@ -174,7 +175,8 @@ SIMILES = (
     (r"\b(?:hanging|dangling|sprouting|rising|protruding|sticking out|hung) (?:from|out of|off) (?=the |its )", "at "),
     (r"(?<=carved )((?:from|out of) [a-z ]+? )with an? [a-z-]+\b", r"\1"),  # "carved from a log with a chainsaw"
     (rf"\b({HUES}) as " + NOUNS, r"\1"),  # "legs black as coal"
-    (r"\b(?:(?:in|of) )?(?:the )?(?:exact |same |deep |rich |dark |pale )?(?:colou?r|shade|hue|tint|tone) of " + NOUNS,
+    (r"\b(?:(?:in|of|with) )?(?:the )?(?:exact |same |deep |rich |dark |pale )?"
+     r"(?:colou?r|shade|hue|tint|tone)(?: and [a-z]+)? of " + NOUNS,
      r"\1 coloured"),  # "the colour of honey"
     (r"\b(?:with|in|and) (?:an? |the )?((?:(?!(?:with|and|or) )[a-z-]+ ){0,3}?[a-z-]+) "
      r"(?:finish|coating|paint job|paintwork|surface|texture|look)\b", r"finished in \1"),
@@ -428,6 +430,10 @@ def _resolved(found: list[Token]) -> list[Token]:
     result: list[Token] = []
     for number, token in enumerate(found):
         ahead = _run(found[number + 1 :])
+        if token.text in ("herringbone", "twill") and any(
+            t.kind == "substance" and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead
+        ):
+            continue  # "herringbone brick"
         if token.text in SHIMMERING and any(t.kind in ("substance", "color", "thing") for t in ahead):
             continue  # "iridescent emerald scales"
         if token.text in METALLIC and any(t.kind == "substance" and KNOWN[t.text][0].look in HAIRY for t in ahead[:2]):
@@ -467,6 +473,8 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("part", "body", PARTS["body"])  # "a helmet with a white shell"
         elif token.kind == "thing" and token.text in KNOWN and _is_stuff(token, ahead, behind):
             token = token._replace(kind="substance", value=None)
+        elif token.kind == "shape" and token.text in OBJECTS and not ahead and _opens(token, result):
+            token = token._replace(kind="thing", value=None)  # "a silver ring"
         elif token.kind == "part" and token.text in WORN & OBJECTS.keys() and not any(t.kind == "thing" for t in result):
             token = token._replace(kind="thing", value=None)  # "faded jeans"
         elif token.kind == "thing" and token.text in PARTS and (result or ahead):
@@ -489,7 +497,8 @@ TIMBER = ("ash", "cherry", "chestnut")
 def _of_timber(tree: str, ahead: list[Token]) -> bool:
     """Whether the name of a tree stands for its wood: before what is usually of it, or ash before a part."""
     part = tree == "ash" and any(t.kind == "part" and " the" not in t.text and " top" not in t.text for t in ahead)
-    return part or any(map(_of_wood, ahead if tree == "ash" else ahead[:1]))
+    veneer = any(t.kind == "substance" and t.text in ("veneer", "timber", "planks", "boards", "ply") for t in ahead[:1])
+    return part or veneer or any(map(_of_wood, ahead if tree == "ash" else ahead[:1]))
 
 
 def _of_wood(token: Token) -> bool:
@@ -501,6 +510,12 @@ def _of_wood(token: Token) -> bool:
 BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beetle", "armadillo", "ladybug",
            "ladybird")
 """Beasts with a shell."""
+
+
+def _opens(token: Token, before: list[Token]) -> bool:
+    """Whether a token ends the first run, which an article opens."""
+    whole = [*before, token]
+    return whole[0].article == "a" and all(t.kind in ("color", "finish", "weather", "size", "substance") for t in before)
 
 
 def _is_jewel(token: Token) -> bool:

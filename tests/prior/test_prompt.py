@@ -110,6 +110,8 @@ def test_prompts_of_every_form_are_understood_as_they_were_judged(read) -> None:
      ("a dragon with blue scales and a pale belly", "a dragon with blue scales, pale belly of blue scales"),
      ("a half melted candle in a silver holder", "a partly melted candle with a silver holder at the lower third"),
      ("a chest, moss-covered oak", "a chest, oak covered in moss"), ("clay on the broken edge", "clay on the edge"),
+     ("a green hobbit door", "a green door"), ("a path of herringbone brick", "a path of brick"),
+     ("a ceramic cat with a jade glaze", "a glossy jade ceramic cat"), ("a ski in ash veneer", "a ski of ash wood"),
      ("a van, red over white", "a van, white, upper half red"), ("a red-roofed white cottage", "a white cottage, red roof"),
      ("a car the shade of a ripe tangerine", "a tangerine car"),
      ("a chair, steel legs black as coal", "a chair, steel legs black"),
