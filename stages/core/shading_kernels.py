@@ -41,7 +41,8 @@ def shade(
     count = len(transport[0])
     lights = count // max(len(material[1]), 1)
     out = tuple(np.empty((count, 3), np.float32) for _ in range(3))
-    tables = (_knot_table(knots), albedo.table(), np.array(knots, np.float32), slopes.astype(np.float32))
+    known = np.ascontiguousarray(_knot_table(knots).transpose(1, 2, 0))  # (COSINE_STEPS, 2, K)
+    tables = (known, albedo.table(), np.array(knots, np.float32), slopes.astype(np.float32))
     floats = tuple(map(np.float32, constants))
 
     def task(part: slice) -> None:
@@ -70,7 +71,40 @@ def shade_backward(
     return out
 
 
+ROOT = np.int32(0x3F3504F3)
+"""The bits of the root of a half."""
+
+
 @compiled
+def logarithms(bits, scratch, result):  # type: ignore[no-untyped-def]
+    """Natural logarithms of float32 numbers over 0, to 1e-7; many at once.
+
+    Source: Moshier 1989, "Methods and Programs for Mathematical Functions" (Cephes, logf).
+
+    Args: bits: of the numbers, int32. scratch: (2, K), overwritten. result: (K,), written.
+    """
+    f32 = np.float32
+    exponent, fraction = scratch[0], scratch[1].view(np.int32)
+    for k in range(len(bits)):
+        above = np.int32(bits[k] - ROOT)
+        exponent[k] = f32(np.int32(above >> np.int32(23)))
+        fraction[k] = np.int32(np.int32(above & np.int32(0x7FFFFF)) + ROOT)
+    for k in range(len(bits)):
+        z = scratch[1, k] - f32(1)
+        q = f32(7.0376836292e-2)
+        q = q * z - f32(1.1514610310e-1)
+        q = q * z + f32(1.1676998740e-1)
+        q = q * z - f32(1.2420140846e-1)
+        q = q * z + f32(1.4249322787e-1)
+        q = q * z - f32(1.6668057665e-1)
+        q = q * z + f32(2.0000714765e-1)
+        q = q * z - f32(2.4999993993e-1)
+        q = q * z + f32(3.3333331174e-1)
+        low = q * z * z * z - f32(2.12194440e-4) * exponent[k] - f32(0.5) * z * z
+        result[k] = z + low + f32(0.693359375) * exponent[k]
+
+
+@compiled(fastmath={"contract", "reassoc", "nsz", "arcp"})
 def _shade(  # type: ignore[no-untyped-def]
     first, lights, E, A, B, cosine, c, roughness, metallic, knot_table, table, knots, slopes, f0, least, dark, tiny, soften,
     bulge, out, out_a, out_r
@@ -79,8 +113,10 @@ def _shade(  # type: ignore[no-untyped-def]
     count = len(knots)
     rows, columns = len(table), table.shape[1]
     bent = np.log(knots + soften)
-    y, value, slope = np.empty(count, np.float32), np.empty(2, np.float32), np.empty(2, np.float32)
-    scale, open_point, by_r = np.empty((count, 2), np.float32), np.empty(2, np.float32), np.empty(2, np.float32)
+    value, slope = np.empty(2, np.float32), np.empty(2, np.float32)
+    raised, y = np.empty(6 * count, np.float32), np.empty(6 * count, np.float32)
+    bits, scratch, least_y = raised.view(np.int32), np.empty((2, 6 * count), np.float32), np.empty(6, np.float32)
+    scale, open_point, by_r = np.empty((2, count), np.float32), np.empty(2, np.float32), np.empty(2, np.float32)
     for i in range(len(E)):
         p = (first + i) // lights
         r, m = roughness[p], metallic[p]
@@ -102,26 +138,31 @@ def _shade(  # type: ignore[no-untyped-def]
             open_point[term] = max(exact, least)
             by_r[term] = (high - low) * np.float32(rows - 1) if exact >= least else np.float32(0)
             for k in range(count):
-                known = knot_table[k, column, term] * (one - fu) + knot_table[k, column + 1, term] * fu
-                scale[k, term] = one / max(known, least)
+                known = knot_table[column, term, k] * (one - fu) + knot_table[column + 1, term, k] * fu
+                scale[term, k] = one / max(known, least)
         for j in range(3):
             for term in range(2):
-                stored = A[i, :, j] if term == 0 else B[i, :, j]
-                least_y = dark * max(stored[count - 1] * scale[count - 1, term], np.float32(0)) + tiny
-                a, b = np.float32(0), np.float32(0)
+                stored, own = A[i, :, j] if term == 0 else B[i, :, j], 2 * j + term
+                least_y[own] = dark * max(stored[count - 1] * scale[term, count - 1], np.float32(0)) + tiny
                 for k in range(count):
-                    y[k] = np.log(max(stored[k] * scale[k, term], np.float32(0)) + least_y)
-                    a += slopes[left, k] * y[k]
-                    b += slopes[left + 1, k] * y[k]
-                rise = y[left + 1] - y[left]
+                    raised[own * count + k] = max(stored[k] * scale[term, k], np.float32(0)) + least_y[own]
+        logarithms(bits, scratch, y)
+        for j in range(3):
+            for term in range(2):
+                a, b, own = np.float32(0), np.float32(0), 2 * j + term
+                ys = y[own * count : (own + 1) * count]
+                for k in range(count):
+                    a += slopes[left, k] * ys[k]
+                    b += slopes[left + 1, k] * ys[k]
+                rise = ys[left + 1] - ys[left]
                 lowest, highest = 3 * min(rise, np.float32(0)) - bulge, 3 * max(rise, np.float32(0)) + bulge
                 a, b = min(max(h * a, lowest), highest), min(max(h * b, lowest), highest)
-                spline = y[left] + x * (x * (3 - 2 * x) * rise + (one - x) * (a * (one - x) - b * x))
-                raised = np.exp(spline)
-                relative = max(raised - least_y, np.float32(0))
+                spline = ys[left] + x * (x * (3 - 2 * x) * rise + (one - x) * (a * (one - x) - b * x))
+                whole = np.exp(spline)
+                relative = max(whole - least_y[own], np.float32(0))
                 change = rise * 6 * x * (one - x) + a * (one - x) * (one - 3 * x) + b * x * (3 * x - 2)
                 value[term] = relative * open_point[term]
-                change = raised * change / (h * (r + soften)) if relative > 0 else np.float32(0)
+                change = whole * change / (h * (r + soften)) if relative > 0 else np.float32(0)
                 slope[term] = change * open_point[term] + relative * by_r[term]
             diffuse, f = (one - m) * c[p, j], f0 * (one - m) + m * c[p, j]
             out[i, j] = diffuse * E[i, j] + f * value[0] + value[1]

@@ -1,5 +1,6 @@
 """Shading from transport: exact where it claims to be, differentiable, and the same compiled or not."""
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
@@ -17,6 +18,7 @@ from stages.core.shading import (
     shade,
     shade_reference,
 )
+from stages.core.shading_kernels import logarithms
 
 
 def generator(seed: int = 0) -> torch.Generator:
@@ -120,3 +122,11 @@ def test_dark_grey_has_a_metallic_twin() -> None:
 def test_packed_rows_come_back() -> None:
     rows = torch.rand(7, WIDTH, generator=generator(4))
     assert torch.equal(Transport.unpack(rows).packed(), rows)
+
+
+def test_logarithms_of_many_numbers_at_once_are_those_of_single_ones() -> None:
+    values = np.exp(np.random.default_rng(0).uniform(-80, 80, 50_001)).astype(np.float32)
+    values[:3] = 1, np.sqrt(0.5), np.nextafter(np.float32(2**0.5), np.float32(2))
+    found = np.empty_like(values)
+    logarithms(values.view(np.int32), np.empty((2, len(values)), np.float32), found)
+    np.testing.assert_allclose(found, np.log(values.astype(np.float64)), rtol=2e-7, atol=1e-7)
