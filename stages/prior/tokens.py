@@ -431,7 +431,7 @@ def _resolved(found: list[Token]) -> list[Token]:
     for number, token in enumerate(found):
         ahead = _run(found[number + 1 :])
         if token.text in ("herringbone", "twill") and any(
-            t.kind == "substance" and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead
+            t.text in KNOWN and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead
         ):
             continue  # "herringbone brick"
         if token.text in SHIMMERING and any(t.kind in ("substance", "color", "thing") for t in ahead):
