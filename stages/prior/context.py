@@ -63,7 +63,7 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             before.finish += phrase.finish or ["glossy"]
             before.colors += phrase.colors
             _add(before.weather, phrase.weather)
-        elif before and not phrase.says_what and not phrase.region:  # "bronze, polished"
+        elif before and not (phrase.says_what or phrase.region or phrase.part):  # "bronze, polished"
             laid = bool(before.region) and (phrase.join.kind == "comma" or bool(gathering(before.substance)))
             whole = result[0] if laid else before  # "a boot with a red sole, worn"
             if any(word in SHOWS for word in phrase.weather):

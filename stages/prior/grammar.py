@@ -223,7 +223,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
     elif kind == "thing" and not phrase.closed:
         phrase.thing, phrase.headed = text, bool(phrase.substance)  # the last of a run says what it is: "school bus"
-    elif kind == "name" and (phrase.substance or phrase.colors) and not phrase.region:
+    elif kind == "name" and (phrase.substance or phrase.colors or _worn_part(phrase)) and not phrase.region:
         phrase.part = text
     elif kind == "animal":
         phrase.animal = text
@@ -239,6 +239,11 @@ SMALL = 0.12
 PLACES = ("along the", "along its", "on the", "on its", "around the", "over the", "across the")
 WITHIN = {"crevices": None, "badge": Region("spots", 0.2, 0.25)}
 """Words before the part on which another lies, and the kinds that do, with where they lie on it if it is elsewhere."""
+
+
+def _worn_part(phrase: Phrase) -> bool:
+    """Whether all that is said of a part is its wear: "a parking meter, yellow top, rusty pole"."""
+    return phrase.join.kind in ("comma", "and", "with") and bool(phrase.weather)
 
 
 def _is_small(phrase: Phrase) -> bool:
@@ -280,7 +285,7 @@ def _name(phrase: Phrase, text: str) -> None:
         return  # "thatched straw"
     elif text == "shell" and family(old) in ("plastic", "metal", "paint"):
         return  # "a plastic shell"
-    elif old == "molten":
+    elif old == "molten" or (old == "lacquer" and family(text) == "metal" and not phrase.colors):
         phrase.substance = text  # "molten gold"
     elif family(old) == "rust" and family(text) == "metal":
         return  # "verdigris copper"

@@ -18,8 +18,8 @@ def rows(name: str) -> list[list[str]]:
 
 
 def words(text: str) -> list[str]:
-    """What commas separate."""
-    return [word.strip() for word in text.split(",") if word.strip()]
+    """What commas separate, as prompts are read: "ship wheel"."""
+    return [word.strip().replace("'s ", " ") for word in text.split(",") if word.strip()]
 
 
 OBJECTS = {name: Thing(float(metres), made) for metres, made, names in rows("things.tsv") for name in words(names)}

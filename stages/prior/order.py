@@ -8,7 +8,7 @@ from stages.prior.grammar import split
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
 from stages.prior.places import CLOTHES, DETAILS, PARTS, PARTS_OF, PEELS, PERSONS, SHAPES, Region, gathering
-from stages.prior.stuffs import GENERIC, KNOWN
+from stages.prior.stuffs import GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import Join
 
 Order = tuple[Phrase, list[Phrase]]
@@ -38,7 +38,8 @@ def _stands(first: Phrase, second: Phrase) -> bool:
         return False  # "paint peeling off a door"
     part = second.where in PARTS and bool(second.region) and second.region != PARTS["walls"]
     solid = bool(second.thing) and _family_made(second) in ("wood", "metal", "stone") and bool(_family_made(first))
-    rests = (bool(first.substance) and not second.thing) or solid or bool(second.part)
+    laid = second.boards or second.substance in PATTERNED  # "a bell on an oak board"
+    rests = (bool(first.substance) and not second.thing) or solid or bool(second.part) or laid
     thing = bool(first.thing) and second.join.kind == "on" and rests
     return (part or thing) and not first.region and not gathering(first.substance)
 

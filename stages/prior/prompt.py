@@ -51,7 +51,19 @@ from stages.prior.places import (
 )  # fmt: skip
 from stages.prior.primer import primed
 from stages.prior.sizes import LEAST, MOST, TIMES, measured
-from stages.prior.stuffs import BOARDS, FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, PAINTABLE, Stuff, boards_of, look_of, stuff
+from stages.prior.stuffs import (
+    BOARDS,
+    FINISH_LOOKS,
+    GENERIC,
+    KNOWN,
+    LOOK_OF,
+    PAINTABLE,
+    PATTERNED,
+    Stuff,
+    boards_of,
+    look_of,
+    stuff,
+)
 from stages.prior.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
@@ -186,7 +198,7 @@ class Reading:
 
     def _more(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
         """A part of which only finish or wear is said: "polished edges", "dirty cracks"."""
-        where = (phrase.region or JOINED["with"]).mask(phrase.where)
+        where = (phrase.region or (DETAILS if phrase.part else JOINED["with"])).mask(phrase.where or phrase.part)
         layers = []
         if phrase.finish:
             metal = (beneath.metallic or 0.0) > 0.5
@@ -224,7 +236,8 @@ class Reading:
             return SHAPES["studs"]
         if phrase.substance in ROOFING and phrase.join.kind in ("", *BESIDE):
             return PARTS["roof"]
-        if (phrase.part or (phrase.thing and phrase.join.beneath)) and phrase.join.kind == "on":
+        stand = phrase.thing or phrase.boards or phrase.substance in PATTERNED
+        if (phrase.part or (stand and phrase.join.beneath)) and phrase.join.kind == "on":
             return PARTS["stand"]  # "a cannon on a wooden carriage"
         if phrase.thing and phrase.colors and lives(phrase.thing) and phrase.join.kind in BESIDE:
             return SHAPES["motifs"]  # "a kimono with gold cranes"

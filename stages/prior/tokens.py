@@ -164,7 +164,7 @@ HANDS = ("rain|sun|sunlight|age|time|years|use|decades|centuries|weather|wind|se
 NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on | in | that | which )"
 SIMILES = (
     (r"\bas (?!well|soon|long|much|many|far)([a-z]+(?:-[a-z]+)?) as " + NOUNS, r"\1"),  # "as black as a raven's wing"
-    (r"\boil[- ]painted\b", "painted"),
+    (r"\boil[- ]painted\b", "painted"), (r"\bcreosoted\b", "dark brown"),
     (r"\bhalf[- ](?=(?:melted|eaten|peeled|rotten|rotted|burnt|burned|charred|opened|broken|ruined|frozen|faded|rusted)\b)",
      "partly "),
     (r"\b[a-z]+[- ]shaped\b(?! (?:like|as|into))", ""),  # "a leaf shaped blade"
@@ -434,6 +434,9 @@ def _resolved(found: list[Token]) -> list[Token]:
             t.text in KNOWN and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead
         ):
             continue  # "herringbone brick"
+        if token.text == "stained" and result and _stained(result[-1], found[number + 1 :]):
+            result[-1] = result[-1]._replace(kind="color", value=None)
+            continue  # "dark stained pine"
         if token.text in SHIMMERING and any(t.kind in ("substance", "color", "thing") for t in ahead):
             continue  # "iridescent emerald scales"
         if token.text in METALLIC and any(t.kind == "substance" and KNOWN[t.text][0].look in HAIRY for t in ahead[:2]):
@@ -447,7 +450,10 @@ def _resolved(found: list[Token]) -> list[Token]:
         dyed = token.kind == "thing" and token.text in COLORS and not (token.article or ahead)
         after = bool(behind) and all(t.kind in ("finish", "color") for t in behind)
         named = after and any(t.kind == "thing" for t in result)  # "a beetle, glossy chestnut"
-        if dyed and result and (result[-1].text == "in" or named):
+        hide = HIDES.get(token.text) if token.kind == "thing" and not (token.article or ahead) else None
+        if hide and result and result[-1].text in ("in", "of"):
+            token = token._replace(kind="substance", text=hide, value=KNOWN[hide])  # "a belt in stingray"
+        elif dyed and result and (result[-1].text == "in" or named):
             token = token._replace(kind="color", value=None)  # "a mesh upper in lemon"
         elif token.text in TIMBER and _of_timber(token.text, ahead[:2]):
             token = Token("substance", f"{token.text} wood")  # "ash legs", "a cherry table"
@@ -455,8 +461,8 @@ def _resolved(found: list[Token]) -> list[Token]:
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
             continue  # "candy apple red paint"
-        if _holds(token, result, found[number + 1 :]):
-            continue  # "a tin biscuit box"
+        if _holds(token, result, found[number + 1 :]) or _serves(token, ahead):
+            continue  # "a tin biscuit box", "a tea bowl"
         if token.text in COLORS and token.kind in ("substance", "thing"):
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)
             if token.text in KNOWN and KNOWN[token.text][0].family != "gem":
@@ -483,12 +489,27 @@ def _resolved(found: list[Token]) -> list[Token]:
     return result
 
 
+def _stained(before: Token, after: list[Token]) -> bool:
+    """Whether wood is stained with a colour, or to look like another: "walnut stained oak"; and not by rust."""
+    wood = bool(after) and after[0].text in KNOWN and KNOWN[after[0].text][0].family == "wood"
+    stain = before.kind == "color" or (before.kind == "substance" and KNOWN[before.text][0].family == "wood")
+    return wood and stain
+
+
 SHIMMERING = ("iridescent", "holographic", "opalescent", "prismatic")
 """Words that say what a part is of where nothing else does."""
 
 METALLIC = {"golden": "golden tan", "silver": "light grey", "copper": "copper colored", "bronze": "golden brown"}
 HAIRY = ("fur", "skin", "feathers", "straw")
 """Metals that lend their colour to what stands after them, and the looks of what has it."""
+
+HIDES = {
+    "stingray": "shagreen", "shark": "shagreen", "ostrich": "ostrich leather", "python": "python leather", "eel": "eelskin",
+    "crocodile": "crocodile leather", "alligator": "crocodile leather", "lizard": "lizard leather", "snake": "snakeskin",
+    "goat": "goatskin", "sheep": "sheepskin", "lamb": "lambskin", "deer": "deerskin", "buffalo": "buffalo leather",
+    "kangaroo": "kangaroo leather", "rabbit": "rabbit fur", "fox": "fox fur", "beaver": "beaver fur", "elk": "elk leather",
+}  # fmt: skip
+"""Beasts whose names are those of their hides where a thing is of them."""
 
 TIMBER = ("ash", "cherry", "chestnut")
 """Trees whose names mean something else, too."""
@@ -552,6 +573,18 @@ def _holds(token: Token, before: list[Token], after: list[Token]) -> bool:
     food = token.kind == "substance" and (KNOWN[token.text][0].look in HELD or token.text in HELD)
     named = bool(after) and after[0].kind in ("thing", "unknown", "name")
     return food and named and any(t.kind == "substance" and t.text not in PAINTED for t in _run(reversed(before)))
+
+
+SERVED = ("tea", "coffee", "wine", "milk", "beer", "water", "sake", "whisky", "egg", "butter", "bread", "cheese", "salt",
+          "sugar", "sauce", "soup", "fruit", "cake", "cookie", "biscuit", "flower", "plant")  # fmt: skip
+"""What vessels and furniture are for."""
+
+
+def _serves(token: Token, ahead: list[Token]) -> bool:
+    """Whether a word only says what the vessel that is named next is for."""
+    vessel = bool(ahead) and ahead[0].kind == "thing" and OBJECTS[ahead[0].text].made.split(" ")[-1] in KNOWN
+    family = KNOWN[OBJECTS[ahead[0].text].made.split(" ")[-1]][0].family if vessel else ""
+    return token.text in SERVED and family in ("ceramic", "metal", "plastic", "wood")
 
 
 def _shades(token: Token, after: list[Token]) -> bool:
