@@ -76,6 +76,13 @@ PARTS_OF = _of_things()
 MADE = {(part, on): stuff for stuff, on, _, parts in rows("parts_made.tsv") for part in words(parts)}
 """What parts are made of, by their name and what they are on: "soft", "hard" or anything."""
 
+GROWN = {
+    **dict.fromkeys(("teeth", "fangs", "tusks", "tusk", "tooth"), Region("front", 0.12)),
+    **dict.fromkeys(("horn", "horns", "antler", "antlers"), PARTS["horns"]),
+    **dict.fromkeys(("claws", "claw", "talons", "hoof", "hooves"), Region("below", 0.15)),
+}  # fmt: skip
+"""Stuffs that are parts of beasts, and where these are."""
+
 OWN = {
     part: (stuff, [own] if own != "own" else [])
     for stuff, _, own, parts in rows("parts_made.tsv") if own for part in words(parts)

@@ -31,6 +31,7 @@ from stages.prior.places import (
     FADE,
     FADED,
     GATHERS,
+    GROWN,
     JOINED,
     LAYERED,
     MADE,
@@ -203,7 +204,9 @@ class Reading:
         if phrase.finish:
             metal = (beneath.metallic or 0.0) > 0.5
             rough = _roughness(phrase, metal) or beneath.roughness
-            layers = [Layer(replace(beneath, roughness=rough, said=_said(phrase)), (where,))]
+            glass = "mirror-like" in phrase.finish and not metal  # "a cabinet with a mirrored door"
+            coat = self._named("silvered glass") if glass else replace(beneath, roughness=rough, said=_said(phrase))
+            layers = [Layer(coat, (where,))]
         for word in _weathers(phrase):
             weather = WEATHER[word]
             coat = self._named(weather.stuff) if weather.stuff else self._beneath(base, None)
@@ -230,6 +233,9 @@ class Reading:
         if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):
             covers = phrase.join.kind in ("cover", "over")
             return gathers._replace(share=max(gathers.share, 0.65)) if covers and gathers.kind != "up" else gathers
+        grown = GROWN.get(phrase.substance.split(" ")[-1])
+        if grown and phrase.join.kind in BESIDE and not phrase.part:
+            return grown
         if strands(phrase) and phrase.join.kind in ("cover", *BESIDE):
             return SHAPES["bands"]._replace(share=0.5, size=0.06) if phrase.within else SHAPES["bands"]._replace(share=0.15)
         if phrase.substance and _family(phrase) == "gem" and phrase.join.kind in BESIDE and not phrase.part:

@@ -164,6 +164,8 @@ HANDS = ("rain|sun|sunlight|age|time|years|use|decades|centuries|weather|wind|se
 NOUNS = r"(?:an? |the )?([a-z' -]+?)(?=$|[,;.:()]| and | with | but | on | in | that | which )"
 SIMILES = (
     (r"\bas (?!well|soon|long|much|many|far)([a-z]+(?:-[a-z]+)?) as " + NOUNS, r"\1"),  # "as black as a raven's wing"
+    (r"\blike an? (?:(?!with |and |but |on )[a-z]+ ){1,4}?"
+     r"(?=(?:in|of|made of|cast in|carved from) )", ""),  # "a ring like a coiled snake in silver"
     (r"\boil[- ]painted\b", "painted"), (r"\bcreosoted\b", "dark brown"),
     (r"\bhalf[- ](?=(?:melted|eaten|peeled|rotten|rotted|burnt|burned|charred|opened|broken|ruined|frozen|faded|rusted)\b)",
      "partly "),
@@ -507,7 +509,8 @@ HIDES = {
     "stingray": "shagreen", "shark": "shagreen", "ostrich": "ostrich leather", "python": "python leather", "eel": "eelskin",
     "crocodile": "crocodile leather", "alligator": "crocodile leather", "lizard": "lizard leather", "snake": "snakeskin",
     "goat": "goatskin", "sheep": "sheepskin", "lamb": "lambskin", "deer": "deerskin", "buffalo": "buffalo leather",
-    "kangaroo": "kangaroo leather", "rabbit": "rabbit fur", "fox": "fox fur", "beaver": "beaver fur", "elk": "elk leather",
+    "kangaroo": "kangaroo leather", "rabbit": "rabbit fur", "fox": "fox fur", "alpaca": "alpaca wool",
+    "llama": "llama wool", "camel": "camel wool", "beaver": "beaver fur", "elk": "elk leather",
 }  # fmt: skip
 """Beasts whose names are those of their hides where a thing is of them."""
 

@@ -114,6 +114,8 @@ def test_prompts_of_every_form_are_understood_as_they_were_judged(read) -> None:
      ("a ceramic cat with a jade glaze", "a glossy jade ceramic cat"), ("a ski in ash veneer", "a ski of ash wood"),
      ("a cabinet of walnut stained pine", "a cabinet of walnut coloured pine"), ("a belt in stingray", "a belt in shagreen"),
      ("a black tea bowl", "a black bowl"),
+     ("a ring like a coiled snake in silver", "a silver ring"),
+     ("a cabinet with a mirrored door", "a cabinet, silvered glass door"),
      ("a van, red over white", "a van, white, upper half red"), ("a red-roofed white cottage", "a white cottage, red roof"),
      ("a car the shade of a ripe tangerine", "a tangerine car"),
      ("a chair, steel legs black as coal", "a chair, steel legs black"),
