@@ -20,6 +20,7 @@ from stages.light.environment import Environment
 from stages.light.exchange import Exchange
 from stages.light.leaving import OwnLight
 from stages.light.own_light import with_own_light
+from stages.light.reconstruction import Neighbours
 
 FILE = "bounces.npz"
 
@@ -55,15 +56,22 @@ class Bounces:
         return self._exchange.solved(material.detach().cpu().numpy().astype(np.float32).repeat(2, 0), self.count).by_light()
 
     def added(
-        self, own: list[OwnLight], transport: Transport, place: tuple[int, int], rows: NDArray[np.int64], n: Tensor, wo: NDArray
+        self,
+        own: list[OwnLight],
+        transport: Transport,
+        place: tuple[int, int],
+        rows: NDArray[np.int64],
+        near: Neighbours,
+        wo: NDArray[np.float32],
     ) -> Transport:
         """Transport of some pixels of a view under one environment, with what the object adds.
 
-        Args: place: view and environment. rows: of the view's object pixels. n, wo: (P, 3) world.
+        Args: place: view and environment. rows: of the view's object pixels. near: how they lie in the picture, and their
+        normals. wo: (P, 3) world.
         """
         view, environment = place
         seen = (self.ends(view)[rows], own[environment], self._exchange.skies[environment], self._counts)
-        return with_own_light(transport.to(torch.float32), n.numpy(), wo, *seen)
+        return with_own_light(transport.to(torch.float32), near.n, wo, *seen, near)
 
     def ends(self, view: int) -> Ends:
         """Where the blocked rays of a view's object pixels end."""

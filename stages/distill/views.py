@@ -28,6 +28,7 @@ from stages.core.shading import KNOTS, LIGHT_MAPS, WIDTH, Transport
 from stages.core.views import SD, read_geometry, read_light_maps, read_transport
 from stages.distill.bounces import Bounces
 from stages.light.leaving import OwnLight
+from stages.light.reconstruction import Neighbours
 from stages.material.survey import Lookup, Survey
 
 CACHE_BYTES = 2 << 30
@@ -148,7 +149,9 @@ class Views:
         surface, eye = self.surface(place[0], rows), self.c2w[place[0]][:3, 3]
         wo = eye - surface.points.numpy()
         wo = (wo / np.linalg.norm(wo, axis=1, keepdims=True)).astype(np.float32)
-        return self.bounces.added(own, transport, place, rows, surface.normals, wo)
+        y, x = np.divmod(self.pixels(place[0])[rows], self.width)
+        near = Neighbours.on_lattice(x, y, surface.normals.numpy(), surface.points.numpy())
+        return self.bounces.added(own, transport, place, rows, near, wo)
 
     def light_maps(self, view: int, environment: int) -> Tensor:
         """Light maps of the profile sd, of all object pixels of a view, (P, 6, 3) float16."""

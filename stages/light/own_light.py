@@ -15,6 +15,7 @@ from stages.core.frames import tangent_frame
 from stages.core.knots import KNOTS
 from stages.core.lanes import LANES
 from stages.core.parallel import compiled, in_parallel, slices
+from stages.light import reconstruction
 from stages.light.cells import Cells
 from stages.light.ends import STEPS, Ends
 from stages.light.leaving import POINTS_PER_TASK, OwnLight, Sky, arriving, mirrored
@@ -26,6 +27,10 @@ if TYPE_CHECKING:
 
 NARROW, WIDE = 0.25, 0.5
 """Roughness up to which a lobe takes what the mirror shows, and from which on what its rays bring."""
+
+
+AVERAGED = (0, *(k for k in GLTF.joint if k <= len(KNOTS)))
+"""Sums over whose neighbours noise is averaged: E and A of wide lobes. Narrower ones show edges, and B brings little."""
 
 
 class Thrown(NamedTuple):
@@ -74,14 +79,28 @@ def own_sums(
 
 
 def with_own_light(
-    transport: "Transport", n: NDArray, wo: NDArray, ends: Ends, own: OwnLight, sky: Sky, counts: NDArray[np.int64]
+    transport: "Transport",
+    n: NDArray,
+    wo: NDArray,
+    ends: Ends,
+    own: OwnLight,
+    sky: Sky,
+    counts: NDArray[np.int64],
+    near: reconstruction.Neighbours | None = None,
 ) -> "Transport":
-    """Transport of P points, all L lights of a point after each other, with what the object itself adds."""
+    """Transport of P points, all L lights of a point after each other, with what the object itself adds.
+
+    Args: near: how the points lie in a picture, over which the noise of what is added is averaged; None to leave it.
+    """
     import torch
 
     from stages.core.shading import Transport
 
-    sums = own_sums(np.ascontiguousarray(n, np.float32), np.ascontiguousarray(wo, np.float32), ends, own, sky, counts)[0]
+    some = np.ascontiguousarray(n, np.float32), np.ascontiguousarray(wo, np.float32)
+    sums, noise = own_sums(*some, ends, own, sky, counts)
+    if near is not None:
+        among = reconstruction.variance(2 * np.sqrt(noise[:, AVERAGED]), near)  # its block's too: some see nothing by chance
+        sums[:, AVERAGED] = reconstruction.smoothed(sums[:, AVERAGED], among, near, tuple(range(1, len(AVERAGED))))
     lights = sums.shape[2] // 3
     rows = torch.from_numpy(sums).unflatten(2, (lights, 3)).movedim(2, 1).flatten(0, 1)  # (P L, stored, 3)
     E, A, B = rows.to(transport.E.device).split([1, len(KNOTS), len(KNOTS)], 1)

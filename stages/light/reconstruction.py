@@ -63,6 +63,16 @@ class Neighbours:
         index[y, x] = np.arange(len(x))
         return Neighbours(index, np.stack([x, y], -1).astype(np.int32), points.n, points.point)
 
+    @staticmethod
+    def on_lattice(x: NDArray, y: NDArray, n: NDArray, point: NDArray) -> "Neighbours":
+        """Of points that lie on every so manieth pixel, (P,) each, as crops show them."""
+        step = max(1, int(np.gcd(np.gcd.reduce(x - x[:1]), np.gcd.reduce(y - y[:1]))))
+        pixel = np.stack([x, y], -1).astype(np.int32) // step
+        width, height = pixel.max(0, initial=-1) + 1
+        index = np.full((height, width), -1, np.int32)
+        index[pixel[:, 1], pixel[:, 0]] = np.arange(len(pixel))
+        return Neighbours(index, pixel, np.ascontiguousarray(n, np.float32), np.ascontiguousarray(point, np.float32))
+
 
 def variance(gap: NDArray[np.float32], near: Neighbours) -> NDArray[np.float32]:
     """Variance of each sum from the difference of its two halves, (P, ...): its own or its block's, the larger one.

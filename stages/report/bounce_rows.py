@@ -24,6 +24,7 @@ from stages.light.gbuffer import GBuffer
 from stages.light.light_set import LightSet
 from stages.light.lights import studio
 from stages.light.own_light import with_own_light
+from stages.light.reconstruction import Neighbours
 from stages.light.reference import halved, reference_radiance
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, Quality, Rays, cached_light_set, integrate_with_ends
@@ -81,16 +82,11 @@ class _View:
         self._own = {
             name: between.exchange.solved(material(sides, pair), bounces).by_light() for name, pair in MATERIALS.items()
         }
-        self._values = {name: Material.of(torch.from_numpy(material(self._some, pair))) for name, pair in MATERIALS.items()}
 
     def truth(self) -> tuple[dict[str, list[Tensor]], dict[str, list[float]]]:
         """Tone-mapped radiance of each material under each light, and how far it may be off, percent, from two seeds."""
-        pair = [
-            self._full(
-                *integrate_with_ends(self._scene, self._some, self._lights, CONVERGED, seed, self._between.cells), CONVERGED
-            )
-            for seed in SEEDS
-        ]
+        traced = (self._scene, self._some, self._lights, CONVERGED)
+        pair = [self._full(*integrate_with_ends(*traced, seed, self._between.cells), CONVERGED, self._some) for seed in SEEDS]
         mean = {n: [(a + b) / 2 for a, b in zip(pair[0][n], pair[1][n], strict=True)] for n in MATERIALS}
         off = {n: [_percent(a - b) / 2 for a, b in zip(pair[0][n], pair[1][n], strict=True)] for n in MATERIALS}
         return mean, off
@@ -104,12 +100,13 @@ class _View:
         start = time.perf_counter()
         transports, ends = integrate_with_ends(*job, self._between.cells)
         traced = time.perf_counter() - start
-        assert ends is not None
-        direct = [t[torch.from_numpy(self._pixels)] for t in transports]  # the same, whether it is asked where rays end
         start = time.perf_counter()
-        full = self._full(direct, ends[self._pixels], quality)
-        added = (time.perf_counter() - start) / len(MATERIALS) * len(self._points.n) / len(self._pixels)
-        plain = {name: [reinhard(shade(t, values)) for t in direct] for name, values in self._values.items()}
+        lit = self._full(transports, ends, quality, self._points)
+        added = (time.perf_counter() - start) / len(MATERIALS)
+        some = torch.from_numpy(self._pixels)
+        direct = [t[some] for t in transports]  # the same, whether it is asked where rays end
+        full = {name: [values[some] for values in of_all] for name, of_all in lit.items()}
+        plain = {name: [reinhard(shade(t, self._values(name, self._some))) for t in direct] for name in MATERIALS}
         return [("no bounces", plain, alone), (f"{self._bounces} bounces", full, traced + added)]
 
     def compared(
@@ -130,18 +127,25 @@ class _View:
                 rows.append(Row(setting, quality.lobe, quality.light, light.name, name, seconds, *errors))
         return rows
 
-    def _full(self, transports: list[Transport], ends: Ends | None, quality: Quality) -> dict[str, list[Tensor]]:
-        """Tone-mapped radiance of each material under each light."""
+    def _full(
+        self, transports: list[Transport], ends: Ends | None, quality: Quality, points: GBuffer
+    ) -> dict[str, list[Tensor]]:
+        """Tone-mapped radiance of some points, of each material under each light; its noise is averaged if it is a view."""
         assert ends is not None
         counts, exchange = Rays.plan(quality, self._lights, 0).counts, self._between.exchange
+        near = Neighbours.of(points) if quality.smooth else None
         result: dict[str, list[Tensor]] = {}
         for name, own in self._own.items():
             lit = (
-                with_own_light(t, self._some.n, self._some.wo, ends, light, sky, counts)
+                with_own_light(t, points.n, points.wo, ends, light, sky, counts, near)
                 for t, light, sky in zip(transports, own, exchange.skies, strict=True)
             )
-            result[name] = [reinhard(shade(t, self._values[name])) for t in lit]
+            values = self._values(name, points)
+            result[name] = [reinhard(shade(t, values)) for t in lit]
         return result
+
+    def _values(self, name: str, points: GBuffer) -> Material:
+        return Material.of(torch.from_numpy(material(points, MATERIALS[name])))
 
 
 def against_quadrature(scene: Scene, points: GBuffer, seed: int) -> list[Row]:

@@ -31,6 +31,7 @@ from stages.light.exchange import make_exchange
 from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.lights import BUILTIN
 from stages.light.own_light import with_own_light
+from stages.light.reconstruction import Neighbours
 from stages.light.scene import Scene
 from stages.light.transport import QUALITY, Rays, cached_light_set, integrate_with_ends
 from stages.report.renderers import NEEDS, pole_to_pole, read_arrays, write_arrays
@@ -84,6 +85,7 @@ def measure(python: str, mesh: str, scene: Scene, lights: Sequence[Environment],
         exchange, light_set = make_exchange(scene, cells, [light], 0, bounces), cached_light_set((light,))
         transports, ends = integrate_with_ends(scene, points, light_set, QUALITY["standard"], 0, cells)
         counts, sides = Rays.plan(QUALITY["standard"], light_set, 0).counts, cells.sides(scene)
+        near = Neighbours.of(points)
         assert ends is not None
         for name, pair in MATERIALS.items():
             job = {name: getattr(scene, name) for name in ("vertices", "triangles", "normals")}
@@ -92,7 +94,7 @@ def measure(python: str, mesh: str, scene: Scene, lights: Sequence[Environment],
             job |= {"materials": np.array(pair), "plane": PLANE}
             direct, exact = path_traced(python, job)
             own = exchange.solved(material(sides, pair), bounces)
-            lit = with_own_light(transports[0], points.n, points.wo, ends, own, exchange.sky, counts)
+            lit = with_own_light(transports[0], points.n, points.wo, ends, own, exchange.sky, counts, near)
             values = Material.of(torch.from_numpy(material(points, pair)))
             alone, full = (shade(transport, values).numpy()[some] for transport in (transports[0], lit))
             errors = (rms(alone, direct), rms(alone, exact), rms(full, exact))

@@ -14,12 +14,13 @@ from stages.light.ends import Ends
 from stages.light.environment import Environment
 from stages.light.exchange import Exchange, make_exchange, reached
 from stages.light.gbuffer import GBuffer
-from stages.light.leaving import OwnLight, reflectance
+from stages.light.leaving import OwnLight, make_skies, reflectance
 from stages.light.own_light import with_own_light
+from stages.light.reconstruction import Neighbours
 from stages.light.reference import reference_radiance
 from stages.light.scene import Scene
 from stages.light.terms import GLTF
-from stages.light.transport import QUALITY, cached_light_set, integrate, integrate_with_ends, trace
+from stages.light.transport import QUALITY, Quality, cached_light_set, integrate, integrate_with_ends, trace
 from tests.light import scenes
 
 STANDARD = QUALITY["standard"]
@@ -107,6 +108,35 @@ def test_a_mirror_shows_the_object_as_it_is() -> None:
     exact = reference_radiance(scene, points[pixels], light, 1, box, 1)
     assert len(pixels) > 4
     assert percent(found, exact) < 3
+
+
+def test_noise_of_what_is_added_is_averaged_over_a_picture() -> None:
+    """Of plaster in a bowl: with neighbours less than half of the error that its own few rays leave, and the same energy."""
+    scene, light = scenes.bowl(), scenes.even_light()
+    points, cells, lights = scenes.view_of(scene, 48, (1.6, 1.0, 1.7)), Cells.of(scene, FEW), cached_light_set((light,))
+    own = make_exchange(scene, cells, [light], 0, 2).solved(everywhere(WHITE).repeat(2 * len(cells), 0), 2)
+    sky = make_skies([light])[0]
+
+    def added(quality: Quality, near: Neighbours | None) -> NDArray:
+        transports, ends = integrate_with_ends(scene, points, lights, quality, 0, cells)
+        assert ends is not None
+        full = with_own_light(transports[0], points.n, points.wo, ends, own, sky, GLTF.counts(quality.lobe), near)
+        return (full.E - transports[0].E).numpy()
+
+    exact, inside = added(STANDARD.scaled(64), None), points.n[:, 2] > 0
+    alone, averaged = (added(STANDARD, near) for near in (None, Neighbours.of(points)))
+    error = [np.sqrt(np.square(found - exact)[inside].mean()) for found in (alone, averaged)]
+    assert error[1] < 0.5 * error[0]
+    assert averaged.mean() == pytest.approx(exact.mean(), rel=0.02)
+
+
+def test_pixels_of_a_crop_are_neighbours_on_its_lattice() -> None:
+    """Every third pixel from (5, 2): next to each other as the pixels of a picture are."""
+    x, y = 5 + 3 * np.array([0, 1, 0, 2]), 2 + 3 * np.array([0, 0, 1, 1])
+    near = Neighbours.on_lattice(x, y, np.zeros((4, 3)), np.zeros((4, 3)))
+    found = near.index[near.pixel[:, 1].min() :, near.pixel[:, 0].min() :]
+    assert found.tolist() == [[0, 1, -1], [2, -1, 3]]
+    assert Neighbours.on_lattice(x[:1], y[:1], np.zeros((1, 3)), np.zeros((1, 3))).index[2, 5] == 0
 
 
 def test_zero_bounces_are_direct_light_bit_for_bit() -> None:
