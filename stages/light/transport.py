@@ -191,7 +191,13 @@ def integrate_with_ends(
     import torch  # here, for who only asks for what a known material reflects has no tensors
 
     cosine = torch.from_numpy((points.n * points.wo).sum(-1).clip(MIN_COSINE, 1.0))
-    return [_transport(mean[:, :, 3 * e : 3 * e + 3], cosine) for e in range(len(lights.environments))], sums.ends
+    return [_transport(some, cosine) for some in each_light(mean, len(lights.environments))], sums.ends
+
+
+def each_light(sums: NDArray[np.float32], count: int) -> NDArray[np.float32]:
+    """(P, stored, CHANNELS) as (count, P, stored, 3), each light's together: who reads one need not pass over the others."""
+    points, stored, _ = sums.shape
+    return np.ascontiguousarray(sums[:, :, : 3 * count].reshape(points, stored, count, 3).transpose(2, 0, 1, 3))
 
 
 def _transport(sums: NDArray, cosine: "Tensor") -> "Transport":

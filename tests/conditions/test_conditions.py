@@ -9,12 +9,12 @@ import pytest
 import torch
 
 from stages.conditions.options import ConditionsOptions
-from stages.conditions.stage import conditions
+from stages.conditions.stage import check_finite, conditions
 from stages.core.artifact import load_npz, read_exr, read_manifest, write_exr
-from stages.core.errors import ArtifactError, InputError, OutputError
+from stages.core.errors import ArtifactError, InputError, NumericalError, OutputError
 from stages.core.frames import camera_rays
 from stages.core.schemas import CAMERAS, CONDITIONS
-from stages.core.shading import F0, KNOTS
+from stages.core.shading import F0, KNOTS, Transport
 from stages.core.views import light_map_names, read_geometry, read_light_maps, read_transport
 from stages.light.bounce import blender_light_maps
 from stages.light.gbuffer import trace_view
@@ -191,3 +191,12 @@ def test_output_that_cannot_be_a_folder(prep: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="expected a folder"):
         conditions(prep, tmp_path / "file", SMALL)
+
+
+def test_transports_that_are_not_finite_are_told_by_view_and_pixel_and_very_large_ones_pass() -> None:
+    large = torch.full((40, 9, 3), 3e38)  # the sum of which is infinite
+    check_finite(Transport(torch.zeros(40, 3), large, large, torch.ones(40)), "sun", 2, 7)
+    broken = torch.zeros(40, 9, 3)
+    broken[13, 4, 1] = torch.nan
+    with pytest.raises(NumericalError, match="B is not finite: environment sun, view 2, pixel 13 of the object, seed 7"):
+        check_finite(Transport(torch.zeros(40, 3), large, broken, torch.ones(40)), "sun", 2, 7)
