@@ -1,5 +1,6 @@
 """The material that a recipe gives to points of a surface: the one function that bake, distill, previews and swatches share."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cache
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.core.color import srgb_decode
+from stages.core.parallel import compiled
 from stages.material.directions import WHOLE, Pieces, along
 from stages.material.look import Look, from_oklab, to_oklab
 from stages.material.masks import coverage
@@ -155,15 +157,31 @@ FOOTPRINTS = tuple(2.0**k for k in range(-13, -5))
 def steadying(look: str, footprint: Array) -> Array:
     """By what a look's colours are multiplied so that their mean is the same at every footprint: what is too fine to be seen
     leaves it a little darker or lighter where colours are not linear in it. Args: (P,) metres. Returns: (3, P)."""
-    octave = np.log2(footprint / np.float32(METRES[look]))
-    return np.stack([np.interp(octave, np.log2(FOOTPRINTS), gain) for gain in _gains(look)]).astype(np.float32)
+    result = np.empty((3, len(footprint)), np.float32)
+    _between(_gains(look), footprint, np.float32(METRES[look] * FOOTPRINTS[0]), result)
+    return result
+
+
+@compiled
+def _between(gains, footprint, finest, result):  # type: ignore[no-untyped-def]
+    """Gains (3, K), an octave apart from the finest footprint on, between which they are interpolated."""
+    last, most = np.float32(-1), gains.shape[1] - 1
+    low, within = 0, np.float32(0)
+    for i in range(len(footprint)):
+        if footprint[i] != last:  # most points have their neighbour's
+            last = footprint[i]
+            octave = min(max(np.float32(math.log2(last / finest)), np.float32(0)), np.float32(most))
+            low = min(int(octave), most - 1)
+            within = octave - np.float32(low)
+        for c in range(3):
+            result[c, i] = gains[c, low] + (gains[c, low + 1] - gains[c, low]) * within
 
 
 @cache
 def _gains(look: str) -> Array:
     """Mean at the finest footprint over that at each of `FOOTPRINTS`, (3, K)."""
     found = np.stack([_sampled(look, METRES[look] * share, 64).color.mean(1) for share in FOOTPRINTS], 1)
-    return np.clip(found[:, :1] / np.maximum(found, 1e-6), 0.7, 1.4)
+    return np.clip(found[:, :1] / np.maximum(found, 1e-6), 0.7, 1.4).astype(np.float32)
 
 
 def _sampled(look: str, footprint: float, count: int) -> Look:

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from stages.material.directions import FIRST_ROUND, FLOOR, WHOLE, Pieces, along, along_reference, measure
-from stages.material.evaluate import COLUMNS, evaluate
+from stages.material.evaluate import COLUMNS, FOOTPRINTS, _gains, evaluate, steadying
 from stages.material.masks import settled
 from stages.material.recipe import Coat, Layer, Mask, Recipe
+from stages.material.substances import METRES
 from stages.material.surface import Surface
 from stages.material.survey import EMPTY, Lookup, Survey, connected_pieces, make_survey
 
@@ -216,3 +217,11 @@ def test_white_leather_is_clean() -> None:
         found = evaluate(Recipe(Coat("leather", color)), surface)[:, :3].mean(1)
         spread.append(found.std() / found.mean())
     assert 0 < spread[1] < 0.5 * spread[0]
+
+
+def test_gains_are_interpolated_between_octaves_of_the_footprint() -> None:
+    footprint = np.exp(np.random.default_rng(0).uniform(-16, 2, 3000)).astype(np.float32)
+    footprint[:4] = METRES["rust"] * np.array([FOOTPRINTS[0], FOOTPRINTS[-1], FOOTPRINTS[3], FOOTPRINTS[3]])
+    octave = np.log2(footprint / np.float32(METRES["rust"]))
+    expected = [np.interp(octave, np.log2(FOOTPRINTS), gain) for gain in _gains("rust")]
+    np.testing.assert_allclose(steadying("rust", footprint), expected, rtol=2e-6)
