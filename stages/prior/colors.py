@@ -99,7 +99,7 @@ SHADES = {
     "fox red": "#b4561f", "mint green": "#a3d9b5",
     "grey green": "#7d8f7a", "green grey": "#7d8f7a", "grey brown": "#7d7166", "brown grey": "#7d7166",
     "glacier blue": "#a8cfe0", "arctic blue": "#b4d6e6", "gulf blue": "#5aa8d0", "delphinium": "#5068b0",
-    "iron grey": "#5c5f61",
+    "iron grey": "#5c5f61", "strong tea": "#7a3e1c", "weak tea": "#b07844", "milky tea": "#b48c68",
 }
 """Names that training never draws: those of paint cards and cloth, of seas and skies, and what joiners do to wood."""
 
@@ -107,7 +107,14 @@ LIKENED = {
     "sea": "#3c8d94", "sky": "#82bce6", "storm": "#4f6272", "fog": "#c3c7c8", "mist": "#cdd5d4",
     "smoke": "#848884", "flame": "#e2582a", "sunset": "#f08050", "ember": "#c04a20", "raven": "#14161a",
     "ink": "#1a2238", "milk": "#f4f0e6", "bay": "#5c3a24", "fig": "#532d3b", "raisin": "#3f2a2c",
-    "pebble": "#a49c90", "desert sand": "#d8bd94", "military": "#4b5320", "flax": "#dccb94",
+    "pebble": "#a49c90", "storm cloud": "#4f5a64", "thundercloud": "#454f5a", "thunder cloud": "#454f5a",
+    "rain cloud": "#6b747c",
+    "night sky": "#101a38", "midnight sky": "#0c1430", "summer sky": "#6fb4e8", "dawn": "#f4b8a0", "dusk": "#5a5078",
+    "deep sea": "#0c3048", "stormy sea": "#3f5f6a", "lagoon": "#2cb0b0", "moonlight": "#cfd6e4", "sunshine": "#f8d840",
+    "sunrise": "#f4a060", "old penny": "#7a4a30", "new penny": "#c8744c", "autumn leaves": "#b0622a", "wet sand": "#a08a66",
+    "egg yolk": "#f0b020", "clotted cream": "#f2e4bc", "porridge": "#d8c8a8", "rain": "#8a98a4", "thunder": "#454f5a",
+    "candlelight": "#f4c878", "firelight": "#e8843c", "bluebells": "#5a64c0", "cornflowers": "#5170d7", "daffodils": "#f4d02c",
+    "desert sand": "#d8bd94", "military": "#4b5320", "flax": "#dccb94",
 }
 """Things that lend their colour where words say that it is theirs, "the colour of a stormy sea", and not elsewhere."""
 

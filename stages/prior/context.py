@@ -61,7 +61,7 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             before.colors += phrase.colors  # "terrazzo, white base"
         elif before and phrase.substance in CLEAR and _glazes(phrase, before):
             before.finish += phrase.finish or ["glossy"]
-            before.colors += phrase.colors
+            before.colors += phrase.colors if "varnish" not in phrase.substance else []
             _add(before.weather, phrase.weather)
         elif before and not (phrase.says_what or phrase.region or phrase.part):  # "bronze, polished"
             laid = bool(before.region) and (phrase.join.kind == "comma" or bool(gathering(before.substance)))
@@ -84,6 +84,8 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
                     before.substance = "painted metal"
             worn = result[0] if phrase.join.kind == "comma" and before.region and not phrase.coats else before
             _add(worn.weather, phrase.weather or [WEARS[phrase.where]])  # "..., steel joints, some scratches"
+        elif before and _rusty_cloth(before, phrase):
+            before.colors.append("rust colored")
         elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
             _describe(before, phrase)
         elif number == 1 and before and _restates(before, phrase, after):
@@ -292,7 +294,7 @@ def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     if after and after.join.kind in ("on", "over") and after.substance and phrase.coats and set(phrase.weather) & PEELS:
         return False  # "a chair, peeling white paint on grey wood"
     paired = after and after.region and after.join.kind == "and" and after.where not in PARTS
-    if phrase.region or phrase.thing or (phrase.part and not phrase.substance) or paired:
+    if phrase.region or phrase.thing or phrase.part or paired:
         return False
     bare = before.thing and not (before.substance or before.colors or before.unknown)
     dull = bool(before.substance) and not before.metal
@@ -301,6 +303,13 @@ def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     unsaid = hue and bool(before.substance or before.unknown) and not before.colors and whole
     gathers = bool(gathering(phrase.substance))
     return bool(bare and phrase.says_what and not gathers) or unsaid
+
+
+def _rusty_cloth(before: Phrase, phrase: Phrase) -> bool:
+    """Whether rust is the colour of what does not rust: "a sofa in velvet, rust"."""
+    alone = phrase.substance == "rust" and not (phrase.colors or phrase.region or phrase.weather or phrase.thing or phrase.part)
+    cloth = bool(before.substance) and family(before.substance) in ("fabric", "leather", "ceramic")
+    return alone and phrase.join.kind == "comma" and cloth and not before.colors
 
 
 def _describe(before: Phrase, phrase: Phrase) -> None:

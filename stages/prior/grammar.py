@@ -165,7 +165,8 @@ def _dresses(after: Sequence[Token]) -> bool:
     )
 
 
-HOLDERS = ("frame", "frames", "casing", "case", "housing", "stand", "mount", "enclosure", "scabbard", "sheath")
+HOLDERS = ("frame", "frames", "casing", "case", "housing", "stand", "mount", "enclosure", "scabbard", "sheath",
+           "bezel", "setting", "filigree", "cage", "surround")
 """Parts in which another is: "a mirror in a brass frame"."""
 
 
@@ -289,8 +290,8 @@ def _name(phrase: Phrase, text: str) -> None:
         phrase.substance = text  # "molten gold"
     elif family(old) == "rust" and family(text) == "metal":
         return  # "verdigris copper"
-    elif old.endswith("plated") or (old in ("gilt", "gilded") and family(text) == "metal"):
-        return  # "silver-plated copper", "gilt bronze"
+    elif old.endswith("plated") or old in ("gilt", "gilded"):
+        return  # "silver-plated copper", "gilt bronze", "gilded gesso"
     elif text in BOARDS or (text in GENERIC and family(old) == family(text)):
         return  # the first says which
     else:

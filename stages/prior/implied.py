@@ -13,7 +13,7 @@ from stages.prior.tokens import Join, singulars
 
 def implied(phrases: list[Phrase]) -> None:
     """Say it, in place. Args: phrases: one or more."""
-    for step in (_alone, _patterned, _listed, _bodies, _fronts, _heads, _sprinkles, _shade, _scorch, _stuffs):
+    for step in (_alone, _patterned, _listed, _bodies, _fronts, _heads, _stones, _sprinkles, _shade, _scorch, _stuffs):
         step(phrases)
 
 
@@ -90,6 +90,19 @@ FACIAL = {"beard": 0.45, "moustache": 0.3, "visor": 0.45, "mask": 0.45, "eyes": 
 
 NECKS = ("scarf", "necklace", "neckerchief", "bandana", "collar")
 SHOULDERED = ("pads", "pad", "pauldrons", "pauldron", "guards", "plates", "epaulettes")
+
+
+def _stones(phrases: list[Phrase]) -> None:
+    """The stone of a jewel is a gem: "a gold bracelet with a teal stone"."""
+    first, *rest = phrases
+    for phrase in rest if first.thing in JEWELS else []:
+        if phrase.substance in ("stone", "stones") and phrase.join.kind in ("with", "and", "comma") and not phrase.region:
+            phrase.substance = "gem"
+
+
+JEWELS = ("ring", "bracelet", "pendant", "necklace", "brooch", "earring", "earrings", "tiara", "crown", "amulet", "locket",
+          "cufflinks", "bangle", "choker", "engagement ring", "signet ring", "talisman", "circlet", "diadem")  # fmt: skip
+"""Things that are set with stones."""
 
 
 def _sprinkles(phrases: list[Phrase]) -> None:

@@ -184,7 +184,8 @@ def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
             break
         painted = not (k or thing.weather or RUSTY & set(thing.thing.split(" "))) and _paints(phrase)
         whole = (_covers(phrase) or painted or _of_usual(phrase, thing)) if named or not k else False
-        elsewhere = phrase.region or (phrase.part and (k or not phrase.substance)) or not phrase.says_what
+        part = phrase.part and (k or not phrase.substance or phrase.join.kind == "comma")
+        elsewhere = phrase.region or part or not phrase.says_what
         if elsewhere or not (whole or (not k and _upholsters(phrase, thing))) or (thing.colors and not named):
             continue
         dyed = phrase.colors or phrase.coats or any(word in COLORS for word in phrase.substance.split())

@@ -485,9 +485,9 @@ def _painted(made: Phrase) -> str:
     if not own or own.paintable or own.family not in ("wood", "metal"):
         return made.substance
     hues = [word for word in made.colors if word in COLORS or word.startswith("#")]
-    if not hues or made.substance in DYED_METALS:
-        return made.substance
     named, usual = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (_color(made), own.color))
+    if not hues or (made.substance in DYED_METALS and named[0] < WHITE):
+        return made.substance  # no white is anodised
     grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH) and named[0] < WHITE
     same = own.family == "wood" and float(np.linalg.norm(named - usual)) < SIMILAR and named[1] > -GREYISH / 2  # nor green
     return made.substance if grey or same else "painted wood" if own.family == "wood" else "painted metal"
@@ -590,7 +590,7 @@ def _color(phrase: Phrase, own: RGB | None = None) -> RGB:
 
 def _described(wanted: Stuff, named: RGB) -> RGB:
     """A named colour as this stuff has it: "green moss" is moss."""
-    if wanted.paintable or wanted.metallic or wanted.look in PAINTABLE:
+    if wanted.paintable or wanted.metallic or wanted.look in PAINTABLE or wanted.family in ("fabric", "leather"):
         return named
     own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
     one, two = np.hypot(*own[1:]), np.hypot(*other[1:])

@@ -385,12 +385,12 @@ def _names_stuff(text: str) -> bool:
 
 def _worth(text: str) -> bool:
     token = _table()[0].get(text)
-    short = token is not None and token.kind in ("thing", "part") and len(text) < LONG
+    short = token is not None and (token.kind == "thing" or (token.kind == "part" and len(text) < LONG))
     return token is not None and not short and token.kind not in ("filler", "join", "size", "half")
 
 
 LONG = 8
-"""Letters of the shortest thing for which another word may be a slip of the pen."""
+"""Letters of the shortest part for which another word may be a slip of the pen."""
 
 
 def _slips(word: str) -> Iterator[str]:
@@ -436,6 +436,10 @@ def _resolved(found: list[Token]) -> list[Token]:
             t.text in KNOWN and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead
         ):
             continue  # "herringbone brick"
+        if token.text in SPELLS and ahead and ahead[0].kind == "thing" and not result:
+            continue  # "a frost sword"
+        if token.text in SHAPES and token.kind == "postfix" and result and result[-1].text in ("in", "of"):
+            continue  # "a bowl in mottled raku"
         if token.text == "stained" and result and _stained(result[-1], found[number + 1 :]):
             result[-1] = result[-1]._replace(kind="color", value=None)
             continue  # "dark stained pine"
@@ -500,6 +504,9 @@ def _stained(before: Token, after: list[Token]) -> bool:
 
 SHIMMERING = ("iridescent", "holographic", "opalescent", "prismatic")
 """Words that say what a part is of where nothing else does."""
+
+SPELLS = ("frost", "shadow", "void", "plasma", "energy")
+"""What weapons of tales do, not what they are of."""
 
 METALLIC = {"golden": "golden tan", "silver": "light grey", "copper": "copper colored", "bronze": "golden brown"}
 HAIRY = ("fur", "skin", "feathers", "straw")
@@ -596,7 +603,8 @@ def _shades(token: Token, after: list[Token]) -> bool:
     hue = next((k for k, t in enumerate(run) if t.kind != "thing"), 0)
     plain = bool(run) and run[hue].kind == "color" and run[hue].text in COLORS
     stuff = any(t.kind == "substance" for t in run[hue + 1 :])
-    return plain and stuff and (token.kind == "thing" or token.text not in GENERIC)
+    coat = token.kind == "substance" and KNOWN[token.text][0].family == "paint"  # "powder coated mustard steel"
+    return plain and stuff and not coat and (token.kind == "thing" or token.text not in GENERIC)
 
 
 def _run(tokens: Iterable[Token]) -> list[Token]:
