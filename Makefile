@@ -171,7 +171,7 @@ bench: demo/urn.obj | $(MITSUBA) $(CYCLES)  ## speed against error of the light 
 	@echo "look at bench/conditions.png"
 	$(MAKE) beside
 
-bounces: bench/bowl.npz bench/urn.npz | $(MITSUBA)  ## light between surfaces beside Mitsuba's path tracer, five materials (minutes)
+bounces: bench/bowl.npz bench/urn.npz | $(MITSUBA)  ## light between surfaces beside Mitsuba's path tracer, six materials (minutes)
 	[ ! -s $(MITSUBA) ] || $(RUN)/python -m stages.report.bounces $$(sed 's/--mitsuba //' $(MITSUBA)) bench/bounces.csv studio $^
 	@echo "look at bench/bounces.csv"
 

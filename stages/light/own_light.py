@@ -25,7 +25,7 @@ from stages.light.transport_kernels import in_lanes, on_square, weigh
 if TYPE_CHECKING:
     from stages.core.shading import Transport
 
-NARROW, WIDE = 0.25, 0.5
+NARROW, WIDE = 0.2, 0.3
 """Roughness up to which a lobe takes what the mirror shows, and from which on what its rays bring."""
 
 

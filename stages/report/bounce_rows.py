@@ -1,6 +1,6 @@
 """Error against seconds of light between surfaces, as `stages.report.conditions` has it for direct light.
 
-What is compared is the radiance of five materials of the whole object, direct light alone and with bounces, with the converged
+What is compared is the radiance of six materials of the whole object, direct light alone and with bounces, with the converged
 result of both: far more rays of the pixels, the same cells. What cells and their one point each leave out it shares; so it is
 itself held against float64 recursion at a few pixels, of one bounce, under a coarse light. `stages.report.bounces` lays all of
 it beside a path tracer.

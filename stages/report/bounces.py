@@ -1,6 +1,6 @@
 """Light between surfaces beside Mitsuba's path tracer: error of what shades a view, without bounces and with them.
 
-Each mesh is seen once, somewhat from above, in each of five materials. Ours is what distillation has: E, A and B of the view
+Each mesh is seen once, somewhat from above, in each of six materials. Ours is what distillation has: E, A and B of the view
 with what the object adds to them. The truth is `stages.report.path_tracer_worker`, of the same BRDF, along the same rays,
 with paths of bounces + 2 segments; its direct light alone tells what else the two differ by. Errors are tone-mapped,
 x / (1 + x), over the object's pixels, in percent.
@@ -50,6 +50,7 @@ MATERIALS: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {
     "red plastic": ((0.7, 0.03, 0.03, 0.35, 0.0),) * 2,
     "chrome": ((0.55, 0.56, 0.56, 0.05, 1.0),) * 2,
     "rough gold": ((1.0, 0.77, 0.34, 0.45, 1.0),) * 2,
+    "satin gold": ((1.0, 0.77, 0.34, 0.25, 1.0),) * 2,
     "two colours": ((0.8, 0.05, 0.05, 0.6, 0.0), (0.85, 0.85, 0.85, 0.6, 0.0)),
 }
 """Albedo, roughness and metallic on either side of PLANE."""

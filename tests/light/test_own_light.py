@@ -82,9 +82,14 @@ def test_one_bounce_is_that_of_the_quadrature(values: tuple[float, ...], energy:
     assert found.mean() == pytest.approx(exact.mean(), rel=energy)
 
 
-@pytest.mark.parametrize(("roughness", "energy"), ((0.45, 0.02), (0.3, 0.04), (0.22, 0.06)))
-def test_a_metal_bowl_keeps_its_light(roughness: float, energy: float) -> None:
-    """Gold seen in gold, where the sky is bright above: of a lobe that the bowl half hides, the brighter half is left."""
+@pytest.mark.parametrize(
+    ("roughness", "energy", "error"), ((0.45, 0.02, 2), (0.3, 0.04, 4), (0.25, 0.04, 6), (0.22, 0.06, 8.5))
+)
+def test_a_metal_bowl_keeps_its_light(roughness: float, energy: float, error: float) -> None:
+    """Gold seen in gold, where the sky is bright above: of a lobe that the bowl half hides, the brighter half is left.
+
+    Direct light alone is off by 21 to 32 %.
+    """
     scene, values = scenes.bowl(), (1.0, 0.77, 0.34, roughness, 1.0)
     up = np.linspace(1, -1, 32)[:, None, None]
     light = Environment("overhead", np.exp(1.2 * up).repeat(64, 1).repeat(3, 2).astype(np.float32))
@@ -93,6 +98,7 @@ def test_a_metal_bowl_keeps_its_light(roughness: float, energy: float) -> None:
     direct, found = (radiance[pixels] for radiance in shaded(scene, points, light, values, 1))
     exact = reference_radiance(scene, points[pixels], light, 1, lambda p: everywhere(values).repeat(len(p.n), 0), 1)
     assert len(pixels) > 5 and direct.mean() < 0.7 * exact.mean()
+    assert percent(found, exact) < error
     assert found.mean() == pytest.approx(exact.mean(), rel=energy)
 
 
