@@ -253,7 +253,7 @@ def with_normals(subject: Subject, maps: Maps) -> Maps:
     normals = relief_normals(
         maps.height, maps.roughness, touched, subject.layout, mesh["charts"], corners, frames, own
     )  # fmt: skip
-    subject.pad(normals, maps.material)
+    subject.pad(normals, maps.roughness)
     return replace(maps, normal=normals)
 
 
