@@ -99,7 +99,7 @@ SHADES = {
     "fox red": "#b4561f", "mint green": "#a3d9b5",
     "grey green": "#7d8f7a", "green grey": "#7d8f7a", "grey brown": "#7d7166", "brown grey": "#7d7166",
     "glacier blue": "#a8cfe0", "arctic blue": "#b4d6e6", "gulf blue": "#5aa8d0", "delphinium": "#5068b0",
-    "iron grey": "#5c5f61", "strong tea": "#7a3e1c", "weak tea": "#b07844", "milky tea": "#b48c68",
+    "iron grey": "#5c5f61", "strong tea": "#7a3e1c", "candy red": "#c4102c", "weak tea": "#b07844", "milky tea": "#b48c68",
 }
 """Names that training never draws: those of paint cards and cloth, of seas and skies, and what joiners do to wood."""
 
