@@ -31,70 +31,12 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             after.finish += phrase.finish
             after.colors[:0] = phrase.colors
             _add(after.weather, phrase.weather)
-        elif before and _only_names(phrase, result):
-            body = next((p for p in reversed(result) if p.join.beneath), result[0])
-            body.thing = body.thing or phrase.thing
-            _add(body.weather, phrase.weather)
-        elif before and phrase.join.kind == "show":
-            _show(result, phrase)
-        elif before and phrase.join.kind == "through" and phrase.says_what and (not phrase.region or _there(phrase)):
-            if phrase.region:  # "rust showing through white paint at the edges"
-                before.region, before.where, phrase.region, phrase.where = phrase.region, phrase.where, None, ""
-            result[-1] = _covering(before, phrase)
-        elif before and phrase.join.kind == "paint" and not (phrase.says_what or phrase.region):  # "with a satin finish"
-            result[0].finish += phrase.finish
-            _add(result[0].weather, phrase.weather)
-        elif before and phrase.join.kind == "paint" and before.placed and phrase.substance in PAINTED and phrase.colors:
-            before.shows = Phrase(substance=before.substance, boards=before.boards) if before.substance else before.shows
-            before.substance, before.colors = phrase.substance, phrase.colors  # "a bench, cast iron ends painted green"
-            _add(before.weather, phrase.weather)
-        elif before and phrase.join.kind == "paint" and before.region and _finishes(phrase, result[0]):
-            result[0].substance, result[0].colors = phrase.substance or result[0].substance, phrase.colors
-            result[0].finish += phrase.finish  # "with ivory grips and a nickel finish"
-        elif before and phrase.join.kind == "paint" and not (before.region or phrase.region) and before.says_what:
-            phrase.join, phrase.thing = before.join, phrase.thing or before.thing
-            _add(phrase.weather, before.weather)
-            if before.substance:
-                phrase.shows = Phrase(substance=before.substance, boards=before.boards, colors=before.colors)
-            result[-1] = phrase
-        elif before and _ground_of(phrase, before):
-            before.colors += phrase.colors  # "terrazzo, white base"
-        elif before and phrase.substance in CLEAR and _glazes(phrase, before):
-            before.finish += phrase.finish or ["glossy"]
-            before.colors += phrase.colors if "varnish" not in phrase.substance else []
-            _add(before.weather, phrase.weather)
-        elif before and not (phrase.says_what or phrase.region or phrase.part):  # "bronze, polished"
-            laid = bool(before.region) and (phrase.join.kind == "comma" or bool(gathering(before.substance)))
-            whole = result[0] if laid else before  # "a boot with a red sole, worn"
-            if any(word in SHOWS for word in phrase.weather):
-                whole = next((p for p in result if p.coats), whole)  # "green paint over wood, peeling"
-            whole.finish += phrase.finish
-            whole.colors += [word for word in phrase.colors if word in LEANINGS]
-            _add(whole.weather, phrase.weather)
-        elif before and _paint_of_whole(phrase, result[0]):
-            _repaint(result[0], phrase)
-        elif len(result) > 1 and _wears_all(phrase, result):
-            for painted in result:
-                if painted.coats or painted.color_only:
-                    _add(painted.weather, phrase.weather)
-        elif before and _wears(before, phrase):
-            if phrase.coats and not before.coats:  # "a white fence with flaking paint"
-                before.shows = phrase.shows or Phrase(substance=before.substance, thing=before.thing)
-                if before.metal:  # "a red metal toolbox, the paint chipped"
-                    before.substance = "painted metal"
-            worn = result[0] if phrase.join.kind == "comma" and before.region and not phrase.coats else before
-            _add(worn.weather, phrase.weather or [WEARS[phrase.where]])  # "..., steel joints, some scratches"
-        elif before and _rusty_cloth(before, phrase):
-            before.colors.append("rust colored")
-        elif before and phrase.join.kind == "comma" and _describes(before, phrase, after):
-            _describe(before, phrase)
-        elif number == 1 and before and _restates(before, phrase, after):
-            before.substance, before.colors = phrase.substance, phrase.colors or before.colors
-            before.finish += phrase.finish
-            _add(before.weather, phrase.weather)
-        elif len(result) > 1 and _again(result[0], phrase):
-            result[0].finish += phrase.finish
-            _add(result[0].weather, phrase.weather)
+        elif before and (
+            _takes_paint(before, phrase, result)
+            or _takes_wear(before, phrase, result)
+            or _says_again(before, phrase, result, number, after)
+        ):
+            continue
         elif after and _heads(phrase, after):
             after.region, after.where, after.join = phrase.region, phrase.where, Join("with")  # "trim: copper"
         elif before and not phrase.says_what and not (phrase.weather or phrase.finish):
@@ -104,6 +46,91 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
                 phrase.within = before
             result.append(phrase)
     return in_pairs(_laid(result))
+
+
+def _takes_paint(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
+    """Whether a phrase names what others are of, or a paint or glaze on them, which they then have."""
+    if _only_names(phrase, result):
+        body = next((p for p in reversed(result) if p.join.beneath), result[0])
+        body.thing = body.thing or phrase.thing
+        _add(body.weather, phrase.weather)
+    elif phrase.join.kind == "show":
+        _show(result, phrase)
+    elif phrase.join.kind == "through" and phrase.says_what and (not phrase.region or _there(phrase)):
+        if phrase.region:  # "rust showing through white paint at the edges"
+            before.region, before.where, phrase.region, phrase.where = phrase.region, phrase.where, None, ""
+        result[-1] = _covering(before, phrase)
+    elif phrase.join.kind == "paint" and not (phrase.says_what or phrase.region):  # "with a satin finish"
+        result[0].finish += phrase.finish
+        _add(result[0].weather, phrase.weather)
+    elif phrase.join.kind == "paint" and before.placed and phrase.substance in PAINTED and phrase.colors:
+        before.shows = Phrase(substance=before.substance, boards=before.boards) if before.substance else before.shows
+        before.substance, before.colors = phrase.substance, phrase.colors  # "a bench, cast iron ends painted green"
+        _add(before.weather, phrase.weather)
+    elif phrase.join.kind == "paint" and before.region and _finishes(phrase, result[0]):
+        result[0].substance, result[0].colors = phrase.substance or result[0].substance, phrase.colors
+        result[0].finish += phrase.finish  # "with ivory grips and a nickel finish"
+    elif phrase.join.kind == "paint" and not (before.region or phrase.region) and before.says_what:
+        phrase.join, phrase.thing = before.join, phrase.thing or before.thing
+        _add(phrase.weather, before.weather)
+        if before.substance:
+            phrase.shows = Phrase(substance=before.substance, boards=before.boards, colors=before.colors)
+        result[-1] = phrase
+    elif _ground_of(phrase, before):
+        before.colors += phrase.colors  # "terrazzo, white base"
+    elif phrase.substance in CLEAR and _glazes(phrase, before):
+        before.finish += phrase.finish or ["glossy"]
+        before.colors += phrase.colors if "varnish" not in phrase.substance else []
+        _add(before.weather, phrase.weather)
+    else:
+        return False
+    return True
+
+
+def _takes_wear(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
+    """Whether a phrase says how others are worn or finished, and they then are."""
+    if not (phrase.says_what or phrase.region or phrase.part):  # "bronze, polished"
+        laid = bool(before.region) and (phrase.join.kind == "comma" or bool(gathering(before.substance)))
+        whole = result[0] if laid else before  # "a boot with a red sole, worn"
+        if any(word in SHOWS for word in phrase.weather):
+            whole = next((p for p in result if p.coats), whole)  # "green paint over wood, peeling"
+        whole.finish += phrase.finish
+        whole.colors += [word for word in phrase.colors if word in LEANINGS]
+        _add(whole.weather, phrase.weather)
+    elif _paint_of_whole(phrase, result[0]):
+        _repaint(result[0], phrase)
+    elif len(result) > 1 and _wears_all(phrase, result):
+        for painted in result:
+            if painted.coats or painted.color_only:
+                _add(painted.weather, phrase.weather)
+    elif _wears(before, phrase):
+        if phrase.coats and not before.coats:  # "a white fence with flaking paint"
+            before.shows = phrase.shows or Phrase(substance=before.substance, thing=before.thing)
+            if before.metal:  # "a red metal toolbox, the paint chipped"
+                before.substance = "painted metal"
+        worn = result[0] if phrase.join.kind == "comma" and before.region and not phrase.coats else before
+        _add(worn.weather, phrase.weather or [WEARS[phrase.where]])  # "..., steel joints, some scratches"
+    else:
+        return False
+    return True
+
+
+def _says_again(before: Phrase, phrase: Phrase, result: list[Phrase], number: int, after: Phrase | None) -> bool:
+    """Whether a phrase says more of what was named before, which then has it. Args: number: of the phrase; after: the next."""
+    if _rusty_cloth(before, phrase):
+        before.colors.append("rust colored")
+    elif phrase.join.kind == "comma" and _describes(before, phrase, after):
+        _describe(before, phrase)
+    elif number == 1 and before and _restates(before, phrase, after):
+        before.substance, before.colors = phrase.substance, phrase.colors or before.colors
+        before.finish += phrase.finish
+        _add(before.weather, phrase.weather)
+    elif len(result) > 1 and _again(result[0], phrase):
+        result[0].finish += phrase.finish
+        _add(result[0].weather, phrase.weather)
+    else:
+        return False
+    return True
 
 
 def _finishes(phrase: Phrase, whole: Phrase) -> bool:

@@ -266,13 +266,11 @@ class Reading:
             usual = split(made)[0] if made else Phrase()
             if not phrase.colors and _kin(phrase, usual):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
-            gaudy = {**dict.fromkeys(WOODEN, "painted wood"), **dict.fromkeys(PLAIN_METALS, "painted metal")}
-            named = gaudy.get(phrase.substance, phrase.substance) if _gaudy(phrase) else phrase.substance
+            named = GAUDY.get(phrase.substance, phrase.substance) if _gaudy(phrase) else phrase.substance
             if CORRODES.get(KNOWN[named][0].look) == "verdigris" and _greenish(phrase):
                 named, phrase = "verdigris", replace(phrase, colors=[])  # "copper gone green"
             return self._of(stuff(named, any(map(is_hue, phrase.colors))), phrase)
-        of_part = _stuff_of_part(phrase, beneath)
-        if of_part:
+        if of_part := _stuff_of_part(phrase, beneath):
             return self._of(stuff(of_part, True), phrase)
         horny = phrase.animal in SHELLED and not beneath
         if made and not horny and not (phrase.colors and beneath is not None and _drawn(split(made)[0], beneath)):
@@ -499,6 +497,10 @@ WOODEN = ("wood", "wooden", "timber")
 
 PLAIN_METALS = ("metal", "steel", "iron", "tin", "sheet metal")
 """Metals that are painted where words give them a colour that no metal has: "a red metal toolbox"."""
+
+
+GAUDY = {**dict.fromkeys(WOODEN, "painted wood"), **dict.fromkeys(PLAIN_METALS, "painted metal")}
+"""What they are then."""
 
 
 def _gaudy(phrase: Phrase) -> bool:

@@ -432,37 +432,16 @@ def _resolved(found: list[Token]) -> list[Token]:
     result: list[Token] = []
     for number, token in enumerate(found):
         ahead = _run(found[number + 1 :])
-        if token.text in ("herringbone", "twill") and any(
-            t.text in KNOWN and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead
-        ):
-            continue  # "herringbone brick"
-        if token.text in SPELLS and ahead and ahead[0].kind == "thing" and not result:
-            continue  # "a frost sword"
-        if token.text in SHAPES and token.kind == "postfix" and result and result[-1].text in ("in", "of"):
-            continue  # "a bowl in mottled raku"
         if token.text == "stained" and result and _stained(result[-1], found[number + 1 :]):
             result[-1] = result[-1]._replace(kind="color", value=None)
             continue  # "dark stained pine"
-        if token.text in SHIMMERING and any(t.kind in ("substance", "color", "thing") for t in ahead):
-            continue  # "iridescent emerald scales"
+        if _only_tells_how(token, result, ahead):
+            continue
         if token.text in METALLIC and any(t.kind == "substance" and KNOWN[t.text][0].look in HAIRY for t in ahead[:2]):
             token = token._replace(kind="color", text=METALLIC[token.text], value=None)  # "golden fur"
         behind = _run(reversed(result))
         names = {t.kind for t in ahead} & {"substance", "thing"}
-        if token.text == "left" and ahead and ahead[0].kind in ("finish", "weather"):
-            continue  # "left unglazed"
-        if token.text in ("straw", "reed", "reeds") and any(t.text.startswith("thatch") for t in (*behind, *ahead)):
-            continue  # "thatched straw"
-        dyed = token.kind == "thing" and token.text in COLORS and not (token.article or ahead)
-        after = bool(behind) and all(t.kind in ("finish", "color") for t in behind)
-        named = after and any(t.kind == "thing" for t in result)  # "a beetle, glossy chestnut"
-        hide = HIDES.get(token.text) if token.kind == "thing" and not (token.article or ahead) else None
-        if hide and result and result[-1].text in ("in", "of"):
-            token = token._replace(kind="substance", text=hide, value=KNOWN[hide])  # "a belt in stingray"
-        elif dyed and result and (result[-1].text == "in" or named):
-            token = token._replace(kind="color", value=None)  # "a mesh upper in lemon"
-        elif token.text in TIMBER and _of_timber(token.text, ahead[:2]):
-            token = Token("substance", f"{token.text} wood")  # "ash legs", "a cherry table"
+        token = _of_its_name(token, result, ahead, behind)
         if token.kind == "thing" and ahead and ahead[0].text in COLORS and any(t.kind == "thing" for t in result):
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
@@ -493,6 +472,37 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("part", token.text, PARTS[token.text])
         result.append(token)
     return result
+
+
+def _only_tells_how(token: Token, before: list[Token], ahead: list[Token]) -> bool:
+    """Whether a word says nothing of the stuff beside those of its run: "herringbone brick", "left unglazed"."""
+    after = ahead[0] if ahead else Token("end", "")
+    if token.text in ("herringbone", "twill"):
+        return any(t.text in KNOWN and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead)
+    if token.text in SPELLS:
+        return after.kind == "thing" and not before  # "a frost sword"
+    if token.text in SHAPES and token.kind == "postfix":
+        return bool(before) and before[-1].text in ("in", "of")  # "a bowl in mottled raku"
+    if token.text in SHIMMERING:
+        return any(t.kind in ("substance", "color", "thing") for t in ahead)  # "iridescent emerald scales"
+    if token.text in ("straw", "reed", "reeds"):
+        return any(t.text.startswith("thatch") for t in (*_run(reversed(before)), *ahead))  # "thatched straw"
+    return token.text == "left" and after.kind in ("finish", "weather")
+
+
+def _of_its_name(token: Token, before: list[Token], ahead: list[Token], behind: list[Token]) -> Token:
+    """A thing as the colour, hide or wood that has its name: "an upper in lemon", "a belt in stingray", "a cherry table"."""
+    thing = token.kind == "thing" and not (token.article or ahead)
+    after = bool(behind) and all(t.kind in ("finish", "color") for t in behind)
+    named = after and any(t.kind == "thing" for t in before)  # "a beetle, glossy chestnut"
+    hide = HIDES.get(token.text) if thing else None
+    if hide and before and before[-1].text in ("in", "of"):
+        return token._replace(kind="substance", text=hide, value=KNOWN[hide])
+    if thing and token.text in COLORS and before and (before[-1].text == "in" or named):
+        return token._replace(kind="color", value=None)
+    if token.text in TIMBER and _of_timber(token.text, ahead[:2]):
+        return Token("substance", f"{token.text} wood")
+    return token
 
 
 def _stained(before: Token, after: list[Token]) -> bool:
