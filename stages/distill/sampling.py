@@ -112,8 +112,11 @@ class CropSampler:
 
     def with_own_light(self, own: list[OwnLight], sample: Sample) -> Transport:
         """Transport of a sample's points with what the object throws on itself."""
-        parts = sample.transport.split([len(rows) for rows in sample.where])
-        lit = [self._views.with_own_light(own, *job) for job in zip(sample.source, sample.where, parts, strict=True)]
+        assert sample.images is not None
+        counts, surface = [len(rows) for rows in sample.where], sample.images.surface
+        shapes = zip(surface.points.split(counts), surface.normals.split(counts), strict=True)
+        jobs = zip(sample.source, sample.where, sample.transport.split(counts), shapes, strict=True)
+        lit = [self._views.with_own_light(own, *job) for job in jobs]
         return Transport(*(self._join(lit, name) for name in Transport.__annotations__))
 
     def _maps(
@@ -208,11 +211,12 @@ class PixelSampler:
         """
         views, view, rows = self._views, self._views.seen[number], self._rows[number]
         first = sum(map(len, self._rows[:number]))
-        lights = []
+        surface, lights = views.surface(view, rows), []
         for environment in range(len(views.environments)):
             transport = views.read_transport((view, environment))[torch.from_numpy(rows)]
             if own is not None:
-                transport = views.with_own_light(own, (view, environment), rows, transport)
+                shape = surface.points, surface.normals
+                transport = views.with_own_light(own, (view, environment), rows, transport, shape)
             lights.append(transport.packed().clamp(max=HALF_MAX).half())
         return slice(first, first + len(rows)), Transport.unpack(torch.stack(lights, 1).float().flatten(0, 1))
 

@@ -142,15 +142,23 @@ class Views:
         return self._cache.get((view, environment))
 
     def with_own_light(
-        self, own: list[OwnLight], place: tuple[int, int], rows: NDArray[np.int64], transport: Transport
+        self,
+        own: list[OwnLight],
+        place: tuple[int, int],
+        rows: NDArray[np.int64],
+        transport: Transport,
+        shape: tuple[Tensor, Tensor],
     ) -> Transport:
-        """Transport of some object pixels with what the object throws on itself. Args: place: view and environment."""
+        """Transport of some object pixels with what the object throws on itself.
+
+        Args: place: view and environment. shape: points and normals of the pixels' `surface`.
+        """
         assert self.bounces is not None
-        surface, eye = self.surface(place[0], rows), self.c2w[place[0]][:3, 3]
-        wo = eye - surface.points.numpy()
-        wo = (wo / np.linalg.norm(wo, axis=1, keepdims=True)).astype(np.float32)
+        points, normals = (values.cpu().numpy() for values in shape)
+        wo = self.c2w[place[0]][:3, 3].astype(np.float32) - points
+        wo /= np.linalg.norm(wo, axis=1, keepdims=True)
         y, x = np.divmod(self.pixels(place[0])[rows], self.width)
-        near = Neighbours.on_lattice(x, y, surface.normals.numpy(), surface.points.numpy())
+        near = Neighbours.on_lattice(x, y, normals, points)
         return self.bounces.added(own, transport, place, rows, near, wo)
 
     def light_maps(self, view: int, environment: int) -> Tensor:
