@@ -10,7 +10,7 @@ import numpy as np
 
 from stages.material.directions import WHOLE, Pieces, along
 from stages.material.parts import found, is_detail, small_pieces
-from stages.material.patterns import Spectrum, cells, edge, exceeds, fbm, lost, noise, spots, warped
+from stages.material.patterns import Spectrum, cells, edge, exceeds, fading, fbm, lost, marks, noise, spots, warped
 from stages.material.place import Place
 from stages.material.recipe import Layer, Mask, Recipe
 from stages.material.surface import Array, Surface
@@ -34,7 +34,7 @@ LEAST = {"edges": 0.08, "details": 0.08, "crevices": 0.08, "hidden": 0.06, "up":
 """Least of their fields that counts as an edge, a crease, hidden from the sky, facing up or down: a sphere has none of the
 first three, and a box's walls keep no snow."""
 
-CHANCE = ("patches", "streaks", "scratches", "chips")
+CHANCE = ("patches", "streaks", "chips")
 """Kinds whose field is noise of deviation 1."""
 
 
@@ -57,6 +57,8 @@ def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
     level = 0.0 if mask.level is None else mask.level
     if mask.kind == "gingham":
         return _gingham(mask, at)
+    if mask.kind == "scratches":
+        return _scratches(mask, at)
     value = signal(mask, surface, at)
     if mask.kind in DISTANCES:
         rough = Spectrum(max(mask.size, 1e-3), max(mask.size / 64, 2e-4), 0.75)
@@ -79,7 +81,7 @@ def _cover(mask: Mask, surface: Surface, at: Place) -> Array:
 
 
 def _chance(mask: Mask) -> Spectrum:
-    stretch = {"streaks": (0.16, 0.16, 2.5), "scratches": (1.0, 0.02, 0.02)}.get(mask.kind, (1.0, 1.0, 1.0))
+    stretch = (0.16, 0.16, 2.5) if mask.kind == "streaks" else (1.0, 1.0, 1.0)
     rise = 0.55 + 0.35 * mask.wear
     return Spectrum(mask.size, max(mask.size / 128, 2e-4), rise, stretch, patch=0.4 * mask.wear)
 
@@ -179,6 +181,25 @@ def _gingham(mask: Mask, at: Place) -> Array:
     return (dyed[0] + dyed[1]) * np.float32(0.5)
 
 
+SCRATCHES = ((3.0, 0.014), (1.0, 0.008), (0.3, 0.004))
+"""Length and width of the longest of three sorts of scratches, sizes of the mask; each has a third of its share."""
+
+
+def _scratches(mask: Mask, at: Place) -> Array:
+    """Share of the footprint under strokes that run any way, long and short, in crowds where the surface was handled most."""
+    handled = np.clip(1 + 0.6 * noise(at, 2 * mask.size, 9), 0, 2)
+    whole = np.ones(len(at), np.float32)
+    for sort, (length, width) in enumerate(SCRATCHES):
+        # a stroke covers 0.785 of length and width, and the longest ones are longer than the others
+        count = mask.share / len(SCRATCHES) * length / width / (0.785 * 0.65)
+        most = int(np.clip(np.ceil(2 * count), 1, 16))
+        strokes = marks(at, length * mask.size, width * mask.size, most, 0.0, 2 * np.pi, 20 + sort, 0.7, 0.05)
+        there = strokes.random(1) < np.float32(count / most) * handled
+        seen = fading(width * mask.size, at.footprint)
+        whole *= 1 - strokes.cover * (there * seen + (1 - seen) * np.float32(count / most) * handled)
+    return 1 - whole
+
+
 TURN = np.array([[0.8, 0.36, 0.48], [-0.6, 0.48, 0.64], [0.0, -0.8, 0.6]], np.float32)
 """A rotation, so that veins run aslant."""
 
@@ -212,7 +233,7 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
     world = Place(np.ascontiguousarray(surface.point.T), uv, face, all_seen, seed=recipe.seed)
 
     def settle(mask: Mask, place: Place) -> Mask:
-        if mask.kind in ("all", "gingham") or mask.level is not None:
+        if mask.kind in ("all", "gingham", "scratches") or mask.level is not None:
             return mask
         if mask.kind == "flowers":
             return replace(mask, level=0.0)

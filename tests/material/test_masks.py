@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 from scipy.ndimage import label
 
 from stages.material.masks import coverage, settled
@@ -150,3 +151,21 @@ def test_a_waist_and_arms_are_where_words_say() -> None:
     assert (waist == (abs(surface.point[:, 2]) < 0.125)).mean() > 0.99
     surface, arms = on_cube(Mask("sides", 0.5, 0.05, 0.0))
     assert (arms == (abs(surface.point[:, 1]) > 0.25)).mean() > 0.99
+
+
+def test_scratches_are_thin_strokes_that_run_any_way() -> None:
+    whole = covered(Mask("scratches", 0.05, 0.1), 1024)
+    assert 0.03 < whole.mean() < 0.07
+    assert abs(covered(Mask("scratches", 0.05, 0.1), 128).mean() - whole.mean()) < 0.012  # those that are too thin to see count
+    thick = ndimage.minimum_filter(whole, 7)
+    assert (thick > 0.5).mean() < 0.001  # hardly anything is seven texels wide
+    along, across = np.gradient(ndimage.gaussian_filter(whole, 1.0))
+    steep = np.hypot(along, across) > 0.05
+    turn = np.arctan2(along, across)[steep]
+    assert abs(np.exp(2j * turn).mean()) < 0.25  # no way is preferred
+    pieces, _ = label(whole > 0.4, np.ones((3, 3)))
+    lengths = [max(rows.stop - rows.start, columns.stop - columns.start) for rows, columns in ndimage.find_objects(pieces)]
+    on_strokes = np.array(lengths)[pieces[pieces > 0] - 1] > 40
+    assert on_strokes.mean() > 0.5  # and not specks
+    twice = covered(Mask("scratches", 0.1, 0.1), 512).mean()
+    assert 1.6 < twice / covered(Mask("scratches", 0.05, 0.1), 512).mean() < 2.4
