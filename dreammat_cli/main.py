@@ -33,6 +33,8 @@ COMMANDS = {
 
 INTERRUPTED = 130
 
+STOPPED = "interrupted; the same command continues where it stopped"
+
 OUT_OF_MEMORY = "out of memory; try fewer or smaller --views of conditions, a smaller --size of bake, or a simpler mesh"
 
 
@@ -94,7 +96,7 @@ def main() -> None:
     except click.ClickException as error:
         fail(error.format_message(), error.exit_code)
     except (KeyboardInterrupt, click.Abort):
-        fail("interrupted; the same command continues where it stopped", INTERRUPTED)
+        fail(STOPPED, INTERRUPTED)
     except MemoryError:
         fail(OUT_OF_MEMORY, OutputError.exit_code)
     except RuntimeError as error:
@@ -102,6 +104,8 @@ def main() -> None:
             raise
         fail(OUT_OF_MEMORY, OutputError.exit_code)
     except ImportError as error:
+        if interrupted(error):
+            fail(STOPPED, INTERRUPTED)
         package = (error.name or "a package").split(".")[0]
         if package in ("dreammat_cli", "stages"):
             raise
@@ -109,6 +113,11 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(1)
+
+
+def interrupted(error: BaseException | None) -> bool:
+    """Whether an error came of a signal, as when it meets a package that is just being loaded."""
+    return error is not None and (isinstance(error, KeyboardInterrupt) or interrupted(error.__cause__ or error.__context__))
 
 
 def fail(message: str, code: int) -> None:

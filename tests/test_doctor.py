@@ -60,6 +60,21 @@ def test_code_that_cannot_be_written_beside_is_compiled_all_the_same(tmp_path: P
     assert done.stdout.strip() == str(tmp_path / "stages")
 
 
+def test_a_signal_that_meets_a_package_being_loaded_is_a_signal(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def call(**_: object) -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as signal:
+            raise ImportError("initialization failed") from signal  # as pybind11 does
+
+    monkeypatch.setattr(main, "cli", call)
+    with pytest.raises(SystemExit) as ended:
+        main.main()
+    assert ended.value.code == 130 and capsys.readouterr().err == f"error: {main.STOPPED}\n"
+
+
 @pytest.mark.parametrize(
     ("raised", "words"),
     [

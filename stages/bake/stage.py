@@ -188,12 +188,12 @@ def open_folder(out: Path, prep: Path) -> None:
 
     Args:
         prep: what is baked, which stays if it lies there.
-    Raises: OutputError, also where a file of another program has the manifest's name.
+    Raises: OutputError; ArtifactError where a foreign file has the manifest's name, or a damaged one.
     """
     manifest = out / ASSET.manifest
     old = read_json(manifest) or {}
     if manifest.exists() and not (isinstance(old, dict) and old.get("schema") == ASSET.name):
-        raise OutputError(f"{manifest}: not a file of dreammat's; give another folder, or move that file away")
+        raise ArtifactError(f"{manifest}: not a file of dreammat's; give another folder, or move that file away")
     try:
         out.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=out).close()

@@ -126,8 +126,8 @@ def _distill(
         if not resumed:
             _preview(run)  # what the words alone give
         _all_steps(run, progress)
-        _write(run)
         _preview(run)
+        _write(run)  # the last: a run that finds it has nothing more to do
         for line in told(run.base.recipe, state.moves.moved(run.base.recipe)):
             tell(line)
         log |= {"milliseconds_per_step": clock.per_step(state.step - resumed), "steps": state.step, "resumed": resumed}

@@ -214,7 +214,7 @@ def test_an_asset_of_an_older_version_is_replaced_and_a_foreign_folder_is_not(tm
     assert not (out / "normal.png").exists()
     read_manifest(out, ASSET)
     (out / "bake.json").write_text('{"oven": 200}')
-    with pytest.raises(OutputError, match=r"bake\.json: not a file of dreammat's; give another folder"):
+    with pytest.raises(ArtifactError, match=r"bake\.json: not a file of dreammat's; give another folder"):
         bake(prep, material, out, SMALL)
     assert (out / "bake.json").read_text() == '{"oven": 200}' and (out / "model.glb").exists()
 

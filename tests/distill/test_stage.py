@@ -149,6 +149,30 @@ def test_killed_run_continues_from_its_last_checkpoint(folder: Path, tmp_path: P
     assert whole.read_bytes() == broken.read_bytes()
 
 
+def test_a_run_killed_at_its_very_end_leaves_nothing_undone(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whichever of its files is the last one: another run must find that it has to write the rest."""
+    names = ("material.npz", "material.curve.csv", "material.preview.png")
+    whole, broken = tmp_path / "whole" / names[0], tmp_path / "broken" / names[0]
+    distill(folder / "conditions", whole, options(folder))
+    for killed in ("_preview", "_write"):
+        real = getattr(stage, killed)
+
+        def dies(run: stage.Run, real: Callable[[stage.Run], None] = real) -> None:
+            if run.state.step == run.budget.steps:
+                raise KeyboardInterrupt
+            real(run)
+
+        monkeypatch.setattr(stage, killed, dies)
+        with pytest.raises(KeyboardInterrupt):
+            distill(folder / "conditions", broken, options(folder))
+        monkeypatch.setattr(stage, killed, real)
+        distill(folder / "conditions", broken, options(folder))
+        assert all((whole.parent / name).read_bytes() == (broken.parent / name).read_bytes() for name in names[::2])
+        broken.unlink()
+
+
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04 half a file", None])
 def test_foreign_or_damaged_checkpoint_is_not_continued(folder: Path, tmp_path: Path, damage: bytes | None) -> None:
     out, fresh = tmp_path / "material.npz", tmp_path / "fresh.npz"
