@@ -186,11 +186,13 @@ def unfinish(folder: Path) -> None:
     shutil.copytree(folder / "conditions", folder / UNFINISHED)
     damages.unfinish(folder / UNFINISHED)
     (folder / "material.npz").rename(folder / "whole.npz")
+    preview = (folder / "material.preview.png").read_bytes()
     if (process := os.fork()) == 0:
         stopped(commands(folder, STEPS)["distill"])
         os._exit(0)
     os.waitpid(process, 0)
     (folder / "whole.npz").rename(folder / "material.npz")
+    (folder / "material.preview.png").write_bytes(preview)  # the stopped run has made one of what it began with
     assert (folder / "material.npz.checkpoint").exists()
 
 
