@@ -42,7 +42,7 @@ def _carried(recipe: Recipe, times: float) -> Recipe:
 
 def _unsettled(mask: Mask, times: float) -> Mask:
     """A mask before any mesh was known; where it was found on one, what its word says, to be found again."""
-    if mask.kind in ("pieces", "along"):
+    if mask.kind in ("pieces", "along", "level"):
         kind = PARTS[mask.said].kind if mask.said in PARTS else "below"
         mask = replace(mask, kind=kind, pieces=(), axis=())
     return replace(mask, size=mask.size / times, level=None)

@@ -18,7 +18,7 @@ from stages.material.surface import Array, Surface
 SIDES = ("below", "above", "middle", "front", "back", "left", "right", "sides", "badge", "fade")
 """Kinds that cover a share of the extent, not of the surface."""
 
-DISTANCES = (*SIDES, "along", "pieces", "stripes", "bands", "zigzag", "spots", "dots", "flowers", "checks", "veins")
+DISTANCES = (*SIDES, "along", "level", "pieces", "stripes", "bands", "zigzag", "spots", "dots", "flowers", "checks", "veins")
 """Kinds whose field is a distance from the border, object sizes."""
 
 CENTRED = ("middle", "sides", "badge")
@@ -26,6 +26,9 @@ CENTRED = ("middle", "sides", "badge")
 
 FACING = 0.4
 """How far what bears a badge must face the front: the cosine."""
+
+LEVEL, ROUNDED = 0.5, np.float32(0.1)
+"""Least cosine to the vertical of what lies level, and the radius with which its rim is taken to turn down, object sizes."""
 
 STEEP = 10.0
 """How much farther away what lies behind or faces aside counts."""
@@ -95,6 +98,9 @@ def signal(mask: Mask, surface: Surface, at: Place) -> Array:
         return {"below": -z, "above": z, "fade": z, "front": x, "back": -x, "left": y, "right": -y}[mask.kind]
     if mask.kind == "along":
         return surface.point @ np.array(mask.axis, np.float32)
+    if mask.kind == "level":
+        height = np.float32(mask.axis[2])
+        return np.minimum(-abs(z - height), np.float32(mask.level or 0) + ROUNDED * (surface.normal[:, 2] - np.float32(LEVEL)))
     if mask.kind == "pieces":
         return np.isin(surface.piece, mask.pieces).astype(np.float32)
     if mask.kind in ("edges", "details", "crevices"):
@@ -243,7 +249,7 @@ def settled(recipe: Recipe, surface: Surface, pieces: Pieces = WHOLE) -> Recipe:
             if part := small_pieces(mask, surface):
                 return part
             mask = replace(mask, kind="edges") if mask.kind == "details" else mask
-        if mask.kind in SIDES and mask.said and (part := found(mask, surface)):
+        if mask.kind in (*SIDES, "up") and mask.said and (part := found(mask, surface)):
             return part
         if mask.draw >= 0:
             mask = replace(mask, draw=31 * recipe.seed + mask.draw)

@@ -12,7 +12,7 @@ KINDS = (
     "all", "below", "above", "middle", "front", "back", "left", "right", "sides", "badge", "fade",
     "edges", "details", "crevices", "up", "down", "hidden",
     "spots", "dots", "flowers", "stripes", "bands", "zigzag", "checks", "gingham", "veins",
-    "patches", "streaks", "scratches", "chips", "pieces", "along",
+    "patches", "streaks", "scratches", "chips", "pieces", "along", "level",
 )  # fmt: skip
 """Ways to say where a layer lies; see `masks.py`."""
 

@@ -16,6 +16,7 @@ PLACES = {
     "checks": "checks, {}", "veins": "veins, {}", "patches": "patches, {}", "streaks": "streaks, {}",
     "scratches": "scratches, {}",
     "chips": "chips, {}", "pieces": "pieces of their own", "along": "by its shape",
+    "level": "level, by its shape",
 }  # fmt: skip
 """Kind of a mask → where it is, with its share."""
 

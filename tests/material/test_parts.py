@@ -164,3 +164,37 @@ def test_details_lie_on_edges_where_there_are_no_small_pieces_or_nothing_else() 
         belt = replace(belt, piece=belt.piece * 0 + piece, convexity=sharp)
         cover = covered(belt, "ferrule", region="details") > 0.5
         assert 0.05 < cover.mean() < 0.2 and (abs(belt.point[cover, 0]) > 0.44).all()
+
+
+BACK = [box((-0.32, y, 0.2), (-0.28, y + 0.04, 0.5)) for y in (-0.32, 0.28)] + [box((-0.32, -0.32, 0.42), (-0.28, 0.32, 0.5))]
+CHAIR_LEGS = [box((x, y, -0.5), (x + 0.04, y + 0.04, -0.05)) for x in (-0.32, 0.28) for y in (-0.32, 0.28)]
+CHAIR = [box((-0.32, -0.32, -0.05), (0.32, 0.32, 0.0)), *CHAIR_LEGS, *BACK]
+ARMS = [box((-0.32, y, 0.18), (0.2, y + 0.05, 0.2)) for y in (-0.32, 0.27)]
+SLATS = [box((-0.32, -0.32 + 0.08 * k, -0.03), (0.32, -0.26 + 0.08 * k, 0.0)) for k in range(8)]
+
+
+@pytest.mark.parametrize("word", ["seat", "its seat"])
+def test_a_seat_of_its_own_piece_is_that_piece_and_nothing_else(word: str) -> None:
+    chair = surface(*CHAIR, *ARMS, apart=True)
+    assert ((covered(chair, word, region="up") > 0.5) == (chair.piece == 1)).all()
+    slatted = surface(*SLATS, *CHAIR_LEGS, *BACK, *ARMS, apart=True)
+    assert ((covered(slatted, word, region="up") > 0.5) == (slatted.piece <= 8)).all()
+
+
+def test_a_seat_of_a_chair_in_one_piece_is_what_faces_up_at_its_height() -> None:
+    chair = surface(*CHAIR, *ARMS)
+    faces_up = (chair.normal[:, 2] > 0.9) & (abs(chair.point[:, 2]) < 0.01)
+    assert ((covered(chair, "seat", region="up") > 0.5) == faces_up).all() and faces_up.any()
+
+
+def test_a_tabletop_is_the_top_with_its_edges() -> None:
+    table = surface(*TABLE, apart=True)
+    assert ((covered(table, "tabletop", region="up") > 0.5) == (table.piece == 5)).all()
+
+
+def test_what_has_no_level_part_wears_its_seat_where_it_faces_up() -> None:
+    ball = RNG.normal(size=(8000, 3))
+    ball /= np.linalg.norm(ball, axis=1, keepdims=True)
+    round_ = surface((0.5 * ball, ball))
+    up = covered(round_, "seat", region="up") > 0.5
+    assert up.mean() == pytest.approx(0.3, abs=0.02) and ball[up, 2].min() > ball[~up, 2].max() - 1e-3
