@@ -19,6 +19,7 @@ from stages.light import hit_kernels
 from stages.light.emission import Emission
 from stages.light.horizon import Horizons
 from stages.light.normal_maps import NormalMaps
+from stages.light.packets import Packets
 
 OFFSET = 2e-5
 """Distance by which a secondary ray's origin is lifted off the surface, in world units (object size 1)."""
@@ -35,15 +36,27 @@ class Hits:
 
 
 class _Tree:
-    """Embree's tree over a mesh, built by the first query: 2 s for a million triangles.
+    """Embree's trees over a mesh, each built by its first query: 2 s for a million triangles.
 
-    robust: watertight, and slower.
+    robust: closest hits are watertight, and slower.
     """
 
     def __init__(self, vertices: NDArray, triangles: NDArray, robust: bool) -> None:
         self._mesh = vertices, triangles, robust
         self._lock = Lock()
         self._embree: EmbreeScene | None = None
+        self._packets: Packets | None = None
+
+    def occluded(self, origins: NDArray, directions: NDArray, asked: NDArray[np.int64] | None) -> NDArray[np.bool_]:
+        """Whether anything lies along some of R rays, or all, (R,)."""
+        o, d = np.ascontiguousarray(origins, np.float32), np.ascontiguousarray(directions, np.float32)
+        try:
+            with self._lock:
+                self._packets = self._packets or Packets(*self._mesh[:2])
+        except OSError:  # embreex's own queries then
+            hit = self.run(o, d, query="OCCLUDED") >= 0
+            return hit if asked is None else hit & np.isin(np.arange(len(o)), asked)
+        return self._packets.occluded(o, d, np.arange(len(o)) if asked is None else asked)
 
     def run(self, origins: NDArray, directions: NDArray, **query: object) -> Any:
         """Embree's answer to R rays, (R, 3) each."""
@@ -117,13 +130,19 @@ class Scene:
         triangle = np.where(hit["primID"] < len(self.triangles), hit["primID"], -2).astype(np.int32)
         return triangle, np.stack([1 - hit["u"] - hit["v"], hit["u"], hit["v"]], -1).astype(np.float32)
 
-    def occluded(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
-        """Whether anything, casters too, lies along each ray, at any distance. Args: (R, 3) each."""
-        return self._any.run(origins, directions, query="OCCLUDED") >= 0
+    def occluded(self, origins: NDArray, directions: NDArray, asked: NDArray[np.int64] | None = None) -> NDArray[np.bool_]:
+        """Whether anything, casters too, lies along each ray, at any distance: (R,).
+
+        Rays of one point, or of near ones, are answered faster after each other.
+
+        Args:
+            origins, directions: (R, 3). asked: rows of those that are asked about, in turn; the others are False. None for all.
+        """
+        return self._any.occluded(origins, directions, asked)
 
     def hidden(self, origins: NDArray, directions: NDArray) -> NDArray[np.bool_]:
         """Whether the mesh itself lies along each ray, at any distance. Args: (R, 3) each."""
-        return self._own.run(origins, directions, query="OCCLUDED") >= 0
+        return self._own.occluded(origins, directions, None)
 
     def shaded_smooth(self) -> "Scene":
         """The same mesh with normals that are smooth over every edge: at a vertex, its faces' by the angle they have there.

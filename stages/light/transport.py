@@ -47,7 +47,6 @@ from stages.light.cells import Cells
 from stages.light.ends import Ends, find_ends
 from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
-from stages.light.horizon import WALL
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
 from stages.light.terms import GLTF, Terms
@@ -345,10 +344,6 @@ def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", occluded: ND
     return find_ends(scene, cells, len(drawn.row), found, drawn.origin[ray], drawn.direction[ray])
 
 
-OPEN = 0.1
-"""Least share of open sectors over a tile's points for which rays are sorted."""
-
-
 def blocked(scene: Scene, points: GBuffer, part: NDArray, drawn: "Drawn") -> NDArray[np.bool_]:
     """Which rays (R,) of a tile anything blocks; those are not traced that rise over their triangle's horizon."""
     ng, triangle, horizons = points.ng[part], points.triangle[part], scene.horizons
@@ -356,12 +351,9 @@ def blocked(scene: Scene, points: GBuffer, part: NDArray, drawn: "Drawn") -> NDA
     horizon = horizons.front[triangle]
     behind = (ng * front).sum(-1) < 0
     horizon[behind] = horizons.behind[triangle[behind], None]
-    if (horizon < WALL).mean() < OPEN:
-        return scene.occluded(drawn.origin, drawn.direction)
-    asked = np.flatnonzero(to_trace(drawn.direction, drawn.row, (*tangent_frame(front), ng), horizon))
-    result = np.zeros(len(drawn.direction), np.bool_)
-    result[asked] = scene.occluded(drawn.origin[asked], drawn.direction[asked])
-    return result
+    asked = np.empty(len(drawn.direction), np.int64)
+    count = to_trace(drawn.direction, drawn.row, (*tangent_frame(front), ng), horizon, asked)
+    return scene.occluded(drawn.origin, drawn.direction, asked[:count])
 
 
 def starts(points: GBuffer, part: NDArray) -> tuple[NDArray, NDArray, NDArray]:

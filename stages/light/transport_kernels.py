@@ -280,26 +280,34 @@ def _settle(towards, leaves, origin):  # type: ignore[no-untyped-def]
 
 
 @fast
-def to_trace(direction, row, frame, horizon):  # type: ignore[no-untyped-def]
+def to_trace(direction, row, frame, horizon, asked):  # type: ignore[no-untyped-def]
     """Which rays (R,) may meet something: all but those that rise over the horizon of their point.
 
     Args:
         direction: (R, 3). row: (P, S) of a `Drawn`. frame: (P, 3) each, two tangents of the triangles, and their normals to the
-        side of the rays. horizon: (P, SECTORS) of `Horizons`.
+        side of the rays. horizon: (P, SECTORS) of `Horizons`. asked: (R,), written: those rays, point by point.
+    Returns:
+        How many.
     """
     t, b, n = frame
-    result = np.ones(len(direction), np.bool_)
+    count = 0
     for p in range(len(row)):
-        if horizon[p].min() < WALL:
-            for s in range(row.shape[1]):
-                r = row[p, s]
-                if r >= 0:
-                    x, y, z = direction[r, 0], direction[r, 1], direction[r, 2]
-                    height = (x * n[p, 0] + y * n[p, 1] + z * n[p, 2]) * np.float32(WALL)
-                    along = x * t[p, 0] + y * t[p, 1] + z * t[p, 2]
-                    across = x * b[p, 0] + y * b[p, 1] + z * b[p, 2]
-                    result[r] = height <= np.float32(horizon[p, sector_of(along, across)])
-    return result
+        walled = horizon[p].min() == WALL
+        for s in range(row.shape[1]):
+            r = row[p, s]
+            if r < 0:
+                continue
+            over = False
+            if not walled:
+                x, y, z = direction[r, 0], direction[r, 1], direction[r, 2]
+                height = (x * n[p, 0] + y * n[p, 1] + z * n[p, 2]) * np.float32(WALL)
+                along = x * t[p, 0] + y * t[p, 1] + z * t[p, 2]
+                across = x * b[p, 0] + y * b[p, 1] + z * b[p, 2]
+                over = height > np.float32(horizon[p, sector_of(along, across)])
+            if not over:
+                asked[count] = r
+                count += 1
+    return count
 
 
 @fast
