@@ -6,6 +6,7 @@ from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.implied import WEARS, implied
 from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
+from stages.prior.palettes import spread
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
 from stages.prior.places import PARTS, PEELS, SHAPES, SHOWS, gathering
 from stages.prior.stuffs import GENERIC, KNOWN
@@ -17,6 +18,9 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
     if not phrases:
         return []
     implied(phrases)
+    if phrases[0].substance in CLEAR and not phrases[0].colors and phrases[1:] and phrases[1].join.kind in ("over", "on"):
+        phrases[1].finish += phrases[0].finish or ["glossy"]  # "varnish over oak"
+        phrases = [replace(phrases[1], join=FIRST), *phrases[2:]]
     phrases = grounded(_peeled(phrases))
     result: list[Phrase] = []
     for number, phrase in enumerate(phrases):
@@ -39,13 +43,13 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             continue
         elif after and _heads(phrase, after):
             after.region, after.where, after.join = phrase.region, phrase.where, Join("with")  # "trim: copper"
-        elif before and not phrase.says_what and not (phrase.weather or phrase.finish):
+        elif before and not phrase.says_what and not (phrase.weather or phrase.finish or phrase.join.kind == "except"):
             _lend(before, phrase, after, result)
         else:
             if before and not phrase.within and _within(before, phrase):
                 phrase.within = before
             result.append(phrase)
-    return in_pairs(_laid(result))
+    return spread(in_pairs(_laid(result)))
 
 
 def _takes_paint(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
@@ -63,7 +67,7 @@ def _takes_paint(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
     elif phrase.join.kind == "paint" and not (phrase.says_what or phrase.region):  # "with a satin finish"
         result[0].finish += phrase.finish
         _add(result[0].weather, phrase.weather)
-    elif phrase.join.kind == "paint" and before.placed and phrase.substance in PAINTED and phrase.colors:
+    elif phrase.join.kind == "paint" and before.placed and phrase.substance in PAINTED and phrase.colors and not phrase.region:
         before.shows = Phrase(substance=before.substance, boards=before.boards) if before.substance else before.shows
         before.substance, before.colors = phrase.substance, phrase.colors  # "a bench, cast iron ends painted green"
         _add(before.weather, phrase.weather)
@@ -228,7 +232,7 @@ def _peeled(phrases: list[Phrase]) -> list[Phrase]:
 def _within(before: Phrase, phrase: Phrase) -> bool:
     """Whether a phrase lies on the part of which the one before tells: "a bone handle wrapped in leather", "a red cap with
     white dots"."""
-    nests = phrase.join.kind in ("cover", "partly", "spots", "inlay", "stripe", "check", "stud")
+    nests = phrase.join.kind in ("cover", "partly", "spots", "inlay", "stripe", "check", "stud", "band")
     nests = nests and (phrase.region is None or phrase.where in SHAPES)
     marks = phrase.join.kind == "with" and phrase.where in SHAPES
     marks |= phrase.join.kind in ("comma", "and") and phrase.where in STUDS  # "an ebony handle, brass rivets"

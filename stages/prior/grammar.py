@@ -9,8 +9,10 @@ from itertools import takewhile
 
 from stages.prior.colors import COLORS
 from stages.prior.context import understood
-from stages.prior.motifs import PAINTS
+from stages.prior.implied import CHECKS, PLAIN_PATTERNS
+from stages.prior.motifs import CLOTHS, PAINTS
 from stages.prior.objects import OBJECTS
+from stages.prior.palettes import gathered
 from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
 from stages.prior.places import CLOTHES, DETAILS, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
@@ -33,7 +35,7 @@ def split(
     much, within, article = 1.0, False, ""
     tokens = [
         token if token.kind != "unknown" or matters(token.text) else token._replace(kind="name")
-        for token in tokens_of(prompt, explained or {}, real)
+        for token in gathered(tokens_of(prompt, explained or {}, real))
     ]
     for number, token in enumerate(tokens):
         now, following = phrases[-1], tokens[number + 1] if number + 1 < len(tokens) else Token("end", "")
@@ -43,8 +45,11 @@ def split(
         article = token.article if now.empty else article
         if token.text == "in" and _dresses(tokens[number + 1 :]):
             token = token._replace(value=Join("with"))  # "a bear in a blue jacket"
-        alone = len(phrases) == 1 and _stands_for_itself(token, now, following, article)
-        if alone or (article == "a" and _is_painted(token, phrases)):
+        told = tokens[number + 2].kind if following.text == "," and number + 2 < len(tokens) else ""
+        itself = number == 0 and token.kind == "part" and token.text in OBJECTS and told in ("color", "substance", "finish")
+        alone = itself or (len(phrases) == 1 and _stands_for_itself(token, now, following, article))
+        halved = now.join.kind == "half" and token.kind == "part" and token.text in OBJECTS and now.says_what
+        if alone or halved or (article == "a" and _is_painted(token, phrases)):
             token = Token("thing", token.text)
         if token.kind == "weather":
             now.amount[token.text] = much
@@ -61,7 +66,8 @@ def split(
             within = starts or (within and token.kind not in ("join", "postfix", "comma", "half"))
             if token.kind in ("join", "postfix", "comma", "half"):
                 continue
-            if _begins(token, now) and not (within and _lacks(token, now)):
+            begins = _begins(token, now) and not (within and _lacks(token, now))
+            if begins or _paints_part(token, now, tokens[number + 1 :]):
                 now = Phrase(Join("paint" if token.text in PAINTED else "with"))
                 phrases.append(now)
             _take(now, token, early=len(phrases) < 3)
@@ -81,11 +87,15 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
     if token.kind == "comma":
         return None if now.empty else Join("comma")
     if token.kind == "postfix":
-        if (now.color_only or now.substance) and now.join.kind == "and" and token.text in SHAPES:
+        both = now.join.kind == "and" or bool(now.palette)
+        if (now.color_only or now.substance) and both and token.text in SHAPES:
             now.region, now.where = SHAPES[token.text], token.text  # "red and white striped canvas"
             return None
-        if not now.says_what and token.text in SHAPES:
-            now.region, now.where = SHAPES[token.text], token.text  # "striped canvas"
+        plain = bool(now.thing) and not now.says_stuff and following.kind == "color"
+        if (not now.says_what or plain) and token.text in SHAPES:
+            if now.region and now.where in PARTS:  # "lower half speckled"
+                now.within, now.placed = Phrase(now.join, region=now.region, where=now.where), True
+            now.region, now.where = SHAPES[token.text], token.text  # "striped canvas", "a blanket striped red and white"
             return None
         if following.kind == "part":  # "leather-wrapped grip"
             return None
@@ -110,17 +120,23 @@ def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
         return None  # "blue paint peeling off, ..."
     if token.value.kind in ("show", "through") and following.kind == "part" and now.says_what:
         return None  # "dark steel showing at the edges"
+    if token.value.kind == "crevices" and not (gathering(now.substance) or now.substance in FILLS or now.coats):
+        return Join("ends") if now.says_what else None  # "a pipe between two valves"
     if token.value.kind == "of":
         return Join("of", True) if now.region and now.says_what else None
     if token.value.kind == "in":
-        return Join("on", True) if now.says_what and now.where in SHAPES else None
+        return Join("on", True) if now.says_stuff and now.where in SHAPES else None
     if token.value.kind == "to":
-        return Join("fade") if now.says_what else None
+        return Join("fade") if now.says_what or now.weather else None
     if token.value.kind in ("on", "over") and following.kind == "part" and now.says_what:
         return None  # "moss on the roof"
     return token.value  # type: ignore[no-any-return]
 
 
+
+FILLS = ("gold", "silver", "resin", "epoxy", "mortar", "grout", "cement", "clay", "tar", "lead", "grass", "weeds",
+         "plants", "water")
+"""What else lies between pieces."""
 
 PEELING = {"chipped": "chipped", "peel": "peeling", "flaking": "flaking"}
 """What words that bare what is beneath begin with, and what they say of the coat."""
@@ -154,7 +170,16 @@ def _begins(token: Token, now: Phrase) -> bool:
         if again and not now.placed:
             return False  # "a golem of cooled lava rock"
         return now.placed or bool(now.substance and (now.headed or (token.text in PAINTED and not now.coats)))
+    if token.kind == "color" and now.where == "quartered" and not now.says_stuff:
+        return False  # "a shield quartered red and yellow"
     return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS and text in PARTS))
+
+
+def _paints_part(token: Token, now: Phrase, after: Sequence[Token]) -> bool:
+    """Whether what is painted is a part of a thing only: "a brick wall painted white on the lower half"."""
+    run = list(takewhile(lambda t: t.kind not in ("join", "comma", "half", "postfix"), after))
+    there = bool(run) and run[-1].kind == "part" and " " in run[-1].text
+    return token.text in PAINTED and bool(now.thing) and not now.says_stuff and there
 
 
 def _dresses(after: Sequence[Token]) -> bool:
@@ -196,6 +221,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         said = phrase.of_kind(kind)
         if text not in said:
             said.append(text)
+        phrase.palette = token.value if kind == "color" and token.value else phrase.palette
     elif kind == "part" and phrase.thing and phrase.join is FIRST and text in OBJECTS and lives(phrase.thing):
         phrase.thing = text  # "a hobbit door"
     elif kind == "part" and phrase.thing and phrase.join is FIRST:
@@ -209,7 +235,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
     elif kind == "part" and text.startswith(RINGED) and phrase.where in RINGS:
         region = token.value if token.value.share < BAND or token.value.kind == "middle" else token.value._replace(share=BAND)
         phrase.region, phrase.where, phrase.placed = region, text, phrase.says_what  # "a gold ring around the top"
-    elif kind == "part" and phrase.where in SHAPES and (phrase.says_what or phrase.where.split(" ")[0] in PAINTS):
+    elif kind == "part" and phrase.where in SHAPES and _laid_on(phrase):
         phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "studs around the rim"
     elif kind == "part" and phrase.join is FIRST and phrase.where in SHAPES and not phrase.says_what and text in OBJECTS:
         phrase.thing = text  # "striped cushion"
@@ -228,6 +254,12 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.part = text
     elif kind == "animal":
         phrase.animal = text
+
+
+def _laid_on(phrase: Phrase) -> bool:
+    """Whether a pattern is said to be there, with its colour or such that one knows it."""
+    plain = phrase.join.kind == "with" and phrase.where in (*PLAIN_PATTERNS, *CHECKS, *CLOTHS)
+    return phrase.says_what or plain or phrase.where.split(" ")[0] in PAINTS
 
 
 SIDES = frozenset([f"{at} {side}" for at in ("on", "on the", "at the", "near the", "on its", "at its")

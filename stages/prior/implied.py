@@ -5,16 +5,25 @@ from itertools import pairwise
 
 from stages.prior.colors import CHANGES
 from stages.prior.objects import OBJECTS
-from stages.prior.phrases import Phrase, is_hue
+from stages.prior.phrases import Phrase, family, is_hue
 from stages.prior.places import GATHERS, HEADED, OWN, PARTS, SHAPES, Region, gathering
-from stages.prior.stuffs import ROOFS
+from stages.prior.stuffs import KNOWN, ROOFS
 from stages.prior.tokens import Join, singulars
 
 
 def implied(phrases: list[Phrase]) -> None:
     """Say it, in place. Args: phrases: one or more."""
-    for step in (_alone, _patterned, _listed, _bodies, _fronts, _heads, _stones, _sprinkles, _shade, _scorch, _stuffs):
+    for step in STEPS:
         step(phrases)
+
+
+def _barks(phrases: list[Phrase]) -> None:
+    """Bark is that of the tree that is named: "a birch log, bark peeling off"."""
+    trees = [p.substance.split(" ")[0] for p in phrases if p.substance and family(p.substance) == "wood"]
+    trees += [p.thing.split(" ")[0] for p in phrases if p.thing]
+    for phrase in phrases:
+        if phrase.substance == "bark" and not phrase.colors:
+            phrase.substance = next((f"{tree} bark" for tree in trees if f"{tree} bark" in KNOWN), "bark")
 
 
 def _alone(phrases: list[Phrase]) -> None:
@@ -30,15 +39,41 @@ def _alone(phrases: list[Phrase]) -> None:
 
 def _patterned(phrases: list[Phrase]) -> None:
     """A pattern of which no colour is said is darker than what it lies on: "a striped pullover"."""
-    first = phrases[0]
-    plain = bool(first.thing) and not (first.animal or first.within) and first.where in PLAIN_PATTERNS
-    if len(phrases) == 1 and plain and first.region:
-        phrases.append(Phrase(Join("with"), colors=["dark"], region=first.region, where=first.where))
+    first, *rest = phrases
+    plain = bool(first.thing) and not (first.animal or first.within or first.palette) and first.where in PLAIN_PATTERNS
+    alone = not any(p.where in SHAPES or p.color_only for p in rest)
+    if plain and first.region and alone:
+        phrases.insert(1, Phrase(Join("with"), colors=["dark"], region=first.region, where=first.where))
         first.region, first.where = None, ""
+    for phrase in rest:
+        bare = phrase.join.kind in ("with", "comma") and not (phrase.says_what or phrase.weather or phrase.finish)
+        if bare and not phrase.colors and phrase.where in (*PLAIN_PATTERNS, *CHECKS):
+            phrase.colors = ["black" if phrase.where in CHECKS else "dark"]  # "with checkers on the side"
 
 
 PLAIN_PATTERNS = ("speckled", "flecked", "mottled", "dappled", "striped", "stripes", "spotted", "spots", "dotted",
                   "polka dot", "polka dots")
+CHECKS = ("checks", "chequers", "checkers", "checker", "checkerboard", "chequerboard", "checkered", "chequered")
+"""Patterns that are darker than what they lie on, or black on it."""
+
+
+def _flecked(phrases: list[Phrase]) -> None:
+    """A stuff of one colour that is speckled has specks that are darker: "a mug with a speckled cream glaze"."""
+    for number, phrase in reversed(list(enumerate(phrases))):
+        stuff = phrase.substance and any(map(is_hue, phrase.colors)) and not phrase.palette
+        if stuff and phrase.where in FLECKED and phrase.join.kind not in ("spots", "and") and not phrase.animal:
+            marks = Phrase(Join("with"), colors=[*phrase.colors, "dark"], region=phrase.region, where=phrase.where)
+            if phrase.within:
+                phrase.region, phrase.where, marks.within = phrase.within.region, phrase.within.where, phrase.within
+                phrase.within = None
+            else:
+                phrase.region, phrase.where = None, ""
+            beneath = number + 1 < len(phrases) and phrases[number + 1].join.beneath
+            phrases.insert(number + 1 + beneath, marks)
+
+
+FLECKED = ("speckled", "flecked", "mottled", "dappled")
+"""Patterns that a stuff has of itself."""
 
 
 def _listed(phrases: list[Phrase]) -> None:
@@ -54,6 +89,8 @@ def _bodies(phrases: list[Phrase]) -> None:
     """A beast's skin is all that one sees of it: "an orc with green skin"."""
     first, *rest = phrases
     for number, skin in enumerate(rest if first.thing and not first.says_stuff else []):
+        if skin.join.kind == "and" and phrases[number].color_only and not (skin.region or phrases[number].region):
+            continue  # "an owl, brown and white feathers"
         if skin.where == "coat" and OBJECTS[first.thing].made.split(" with ")[0].endswith("fur"):
             skin.region, skin.where = PARTS["body"], "body"  # "a husky with a grey coat"
         told = bool(skin.colors) or not number
@@ -95,6 +132,11 @@ SHOULDERED = ("pads", "pad", "pauldrons", "pauldron", "guards", "plates", "epaul
 def _stones(phrases: list[Phrase]) -> None:
     """The stone of a jewel is a gem: "a gold bracelet with a teal stone"."""
     first, *rest = phrases
+    for phrase in rest:
+        if phrase.join.kind in ("inlay", "stud") and phrase.color_only:  # "inlaid with turquoise"
+            named = (name for word in phrase.colors for name in (f"{word} stone", word) if name in KNOWN)
+            phrase.substance = next((name for name in named if family(name) in ("gem", "stone")), "")
+            phrase.colors = [] if phrase.substance else phrase.colors
     for phrase in rest if first.thing in JEWELS else []:
         if phrase.substance in ("stone", "stones") and phrase.join.kind in ("with", "and", "comma") and not phrase.region:
             phrase.substance = "gem"
@@ -131,7 +173,8 @@ def _shade(phrases: list[Phrase]) -> None:
     """A pattern that is only darker or lighter is so than what it lies on: "a grey cat with darker stripes"."""
     for number, phrase in enumerate(phrases[1:], 1):
         changed = not phrase.says_what and any(word in CHANGES for word in phrase.colors)
-        part = phrase.where in PARTS and not phrase.within and phrase.region != PARTS["body"]
+        own = bool(phrase.where) and phrase.region is not None and phrase.where not in SHAPES
+        part = (phrase.where in PARTS or own) and not phrase.within and phrase.region != PARTS["body"]
         if changed and (part or phrase.where in SHAPES.keys() - WEARS.keys()):
             whole = [p for p in phrases[:number] if not p.region or p.region.kind == "all"]
             first = next((p for p in reversed(whole) if any(map(is_hue, p.colors))), phrases[0])
@@ -161,3 +204,6 @@ WEARS = {
     **dict.fromkeys(("smudges", "smears"), "dirty"),
 }  # fmt: skip
 """Patterns that are wear where no stuff is named for them."""
+
+STEPS = (_alone, _patterned, _flecked, _listed, _bodies, _fronts, _heads, _stones, _sprinkles, _shade, _scorch, _barks, _stuffs)
+"""What is implied, one after the other."""

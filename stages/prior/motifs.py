@@ -4,7 +4,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 from stages.prior.colors import COLORS
-from stages.prior.phrases import FIRST, Phrase, family, is_hue
+from stages.prior.objects import OBJECTS
+from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
 from stages.prior.places import ANIMALS, PARTS, PRINTED, SHAPES, SHELLED, Region
 from stages.prior.stuffs import KNOWN
 from stages.prior.tokens import Join
@@ -39,7 +40,6 @@ def _painted(phrases: list[Phrase]) -> list[Phrase]:
 PAINTS = {
     "kintsugi": ("gold", [""]), "graffiti": ("spray paint", ["blue", "red", "yellow"]),
     "sprinkles": ("glossy plastic", ["red", "yellow", "blue"]),
-    "rainbow": ("paint", ["red", "orange", "yellow", "green", "blue", "violet"]),
 }
 """Patterns that say of what they are, and of which colours where nobody says."""
 
@@ -62,6 +62,9 @@ def _paintings(phrase: Phrase, beside: list[Phrase]) -> list[Phrase]:
     ]  # fmt: skip
 
 
+PARTICIPLES = ("striped", "banded", "checked", "chequered", "checkered", "quartered", "spotted", "dotted", "patched")
+"""Patterns of which two colours may be told, the first of which is the ground."""
+
 CLOTHS = {"gingham": "red", "houndstooth": "black", "argyle": "green", "tattersall": "brown", "buffalo check": "red"}
 """Checks that are of cloth, and of which colour where nobody says."""
 
@@ -69,6 +72,11 @@ CLOTHS = {"gingham": "red", "houndstooth": "black", "argyle": "green", "tattersa
 def _checked(phrases: list[Phrase]) -> list[Phrase]:
     """Checks of cloth are of two colours, named before or after them, white being the other: "gingham, blue and white"."""
     first, *rest = phrases
+    told = len(rest) > 1 and first.thing and rest[0].where in PARTICIPLES and rest[0].color_only
+    pair = told and rest[0].join.kind == "comma" and _hue_alone(rest[1]) and rest[1].join.kind == "and"
+    if pair and not (first.where or first.palette):
+        marks = replace(rest[1], join=Join("with"), region=rest[0].region, where=rest[0].where)
+        return [replace(first, colors=rest[0].colors), marks, *rest[2:]]  # "a beanie, striped grey and orange"
     if rest and first.thing and not (first.substance or first.where) and rest[0].where in CLOTHS and rest[0].join.kind != "and":
         if rest[0].within:
             return phrases  # "a jar with a red gingham lid"
@@ -86,6 +94,8 @@ def _checked(phrases: list[Phrase]) -> list[Phrase]:
         if phrase.where in CLOTHS and not (phrase.substance or phrase.thing):
             phrase.substance = "fabric"
     if first.where not in SHAPES or first.region is None or not (first.thing or first.substance) or first.animal:
+        return phrases
+    if first.palette:
         return phrases
     pair = len(rest) > 1 and all(_hue_alone(p) for p in rest[:2]) and rest[1].join.kind in ("and", "on")
     if pair and rest[1].join.kind == "on":
@@ -113,7 +123,7 @@ def _grounded(phrases: list[Phrase]) -> list[Phrase]:
         if part and part.region and phrase.where in CLOTHS and phrase.join.kind != "and":
             ground = Phrase(phrase.join, phrase.substance, colors=["white"], region=part.region, where=part.where)
             result.append(ground)
-            phrase = replace(phrase, join=Join("with"), within=ground)
+            phrase = replace(phrase, join=Join("with"), within=ground, colors=phrase.colors or [CLOTHS[phrase.where]])
         result.append(phrase)
     return result
 
@@ -133,8 +143,13 @@ def _plaid(phrase: Phrase) -> bool:
     return bool(phrase.substance) and KNOWN[phrase.substance][0].look == "tartan"
 
 
-def _coat_of(animal: str) -> str:
-    return "glossy plastic" if animal in SHELLED else "cotton" if animal in PRINTED else "fur"
+def coat_of(animal: str, thing: str = "") -> str:
+    """The stuff that shows an animal's marks, or camouflage. Args: thing: what has them."""
+    if animal in SHELLED:
+        return "fur" if thing and lives(thing) else "glossy plastic"
+    made = OBJECTS[thing].made.split(" ")[-1] if thing else ""
+    hard = made in KNOWN and family(made) in ("metal", "plastic", "paint")
+    return "fur" if animal not in PRINTED else "paint" if hard else "cotton"
 
 
 def _marked(phrases: list[Phrase]) -> list[Phrase]:
@@ -145,18 +160,19 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
     if first.animal and not first.substance and bare:
         return [replace(first, substance=after.substance, region=None, where=""), *rest[1:]]  # "zebra striped, in cowhide"
     if first.color_only and after.animal and after.join.kind == "and":
-        first.substance = _coat_of(after.animal)  # "pink and purple leopard print"
+        first.substance = coat_of(after.animal, first.thing)  # "pink and purple leopard print"
     elif first.animal and any(map(is_hue, first.colors)) and after.join.kind == "and" and _hue_or_metal(after):
-        ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), region=None, where="")
+        coat = first.substance or coat_of(first.animal, first.thing)
+        ground = replace(first, animal="", substance=coat, region=None, where="")
         marks = replace(first, join=Join("with"), colors=after.colors or [after.substance])
         return [ground, marks, *rest[1:]]  # "zebra print in pink and black"
     elif first.animal and after.color_only and after.join.kind == "with" and after.where in SHAPES:
         colors = first.colors or [ANIMALS[first.animal][0]]  # "a brown cow with white patches"
-        ground = replace(first, animal="", substance=first.substance or _coat_of(first.animal), colors=colors)
+        ground = replace(first, animal="", substance=first.substance or coat_of(first.animal, first.thing), colors=colors)
         return [ground, replace(after, animal=first.animal, region=None, where=""), *rest[1:]]
     if not first.animal or first.colors or first.substance or not rest or rest[0].region:
         return phrases
-    coat = _coat_of(first.animal)
+    coat = coat_of(first.animal)
     pair = len(rest) > 1 and _hue_or_metal(rest[1]) and rest[1].join.kind == "and" and not rest[1].region
     if rest[0].join.kind == "on" and rest[0].color_only and not pair:
         rest[0].substance = coat  # "leopard spots on tan"

@@ -142,16 +142,6 @@ def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     return body, [first, *others]
 
 
-def _speckled(first: Phrase, over: list[Phrase]) -> Order:
-    """A speckled coat lies all over: "a bottle with a speckled white powder coat"."""
-    mottled = [p.where in MOTTLED and p.coats and not p.within for p in over]
-    return first, [replace(p, region=None, where="") if coat else p for p, coat in zip(over, mottled, strict=True)]
-
-
-MOTTLED = ("speckled", "flecked", "mottled", "marbled", "dappled")
-"""Patterns that a coat may have of itself."""
-
-
 def _told_after(first: Phrase, over: list[Phrase]) -> Order:
     """A thing whose stuff is said after it, if at all."""
     told = any(word in KNOWN or word in COLORS for word in first.thing.split())  # "bronze statue"
@@ -250,13 +240,26 @@ def _either_side(first: Phrase, over: list[Phrase]) -> Order:
     """Two that lie above and below each other share the whole: "gold above, oak below"."""
     if over and over[0].join.kind in ("above", "below") and first.region and not over[0].region:
         over[0] = replace(over[0], region=Region("below" if first.region.kind == "above" else "above", 0.5))
+    pair = over[:2] if len(over) > 1 and first.thing and not first.says_stuff else []
+    if [p.where for p in pair] == ["above", "below"] and gathering(pair[1].substance) and pair[0].says_stuff:
+        weather = [*first.weather, *pair[0].weather]
+        whole = replace(pair[0], thing=first.thing, region=None, where="", join=first.join, weather=weather)
+        return whole, over[1:]  # "a jeep, white paint above, mud below"
     beside = first
     for number, phrase in enumerate(over):
+        if beside.join.kind == "dip" and not beside.region and region_of(phrase) in ("above", "below"):
+            beside = replace(beside, region=Region("below" if region_of(phrase) == "above" else "above", 0.5))
+            over[number - 1] = beside  # "dipped in white, terracotta below"
         region, other = phrase.region, beside.region
         if region and other and phrase.where in ("above", "below") and {region.kind, other.kind} == {"above", "below"}:
             over[number] = replace(phrase, region=region._replace(share=1 - other.share))
         beside = phrase
     return first, over
+
+
+def region_of(phrase: Phrase) -> str:
+    """The kind of place where a phrase lies, if that is said."""
+    return phrase.region.kind if phrase.region else ""
 
 
 def _bared(first: Phrase, over: list[Phrase]) -> Order:
@@ -277,14 +280,20 @@ def _bared(first: Phrase, over: list[Phrase]) -> Order:
 
 def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     """Parts of a thing that has them elsewhere than others. Args: thing: where the first does not name it."""
-    name = thing or first.thing
+    name = thing or first.thing or first.substance
     places = PARTS_OF.get(name) or PARTS_OF.get(name.split(" ")[-1], {})
     for phrase in over:
         for part in (phrase, phrase.within):
             if part and (part.where or part.part or not part.region):
                 names = [part.where or part.part] if part.where or part.part else [part.thing, part.substance]
-                found = (places.get(name.split(" ")[-1]) for name in names if name)
+                names += [part.join.kind] if part.join.kind not in ("cover", "top", "stripe") else []
+                found = (places.get(word) for name in names if name for word in (name, name.split(" ")[-1]))
                 part.region = next(filter(None, found), part.region)
+    for one, other in pairwise(over):
+        again = one.region == other.region is not None and one.substance == other.substance and one.where == other.where
+        if again and other.join.kind == "and" and one.colors and other.colors and not other.within:
+            other.within = Phrase(one.join, region=one.region, where=one.where)  # "red and blue glass" in one window
+            other.region, other.where = SHAPES["patches"], ""
     return first, over
 
 
@@ -335,7 +344,7 @@ def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
 
 
 STEPS = (
-    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _flanked, _speckled, _of_body, _told_after, _either_side,
+    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _flanked, _of_body, _told_after, _either_side,
     _bared, _smaller_last, _dirt_last, _edges_apart,
 )  # fmt: skip
 """What orders phrases, one after the other."""

@@ -22,7 +22,8 @@ class Phrase:
     region: where it lies. where: the word that said so. placed: whether that word came last. shows: what is beneath, where
     it is said. much: factor of the share that it covers; amount: the same of each word of weather. part: the name of a part
     that no table knows. closed: whether what it is was said, "a statue of". headed:
-    whether the thing was named after its stuff. within: the part that it lies on. """
+    whether the thing was named after its stuff. within: the part that it lies on.
+    palette: three colours and more, of which `colors` has the first. """
 
     join: Join = FIRST
     substance: str = ""
@@ -44,6 +45,7 @@ class Phrase:
     closed: bool = False
     headed: bool = False
     within: "Phrase | None" = None
+    palette: list[list[str]] = field(default_factory=list)
 
     @property
     def says_what(self) -> bool:

@@ -180,6 +180,8 @@ JOINED = {
     "swirl": Region("patches", 0.45, 0.25, 0.3),
     **{part: PARTS[part] for part in ("head", "wings", "eyes", "blade", "lid", "neck", "belly", "back", "feet", "roof", "front",
                                       "tail", "beak", "hair", "horns", "sleeves", "base")},
+    "dip": Region("below", 0.5, wear=0.2), "except": PARTS["body"], "crevices": PARTS["crevices"],
+    "ends": Region("sides", 0.15),
     "shell": PARTS["carapace"], "bottom": PARTS["base"], "legs": PARTS["legs"], "seat": PARTS["seat"],
     "paint": Region("all", 1.0),
 }  # fmt: skip

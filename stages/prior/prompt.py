@@ -20,6 +20,7 @@ from stages.material.substances import LOOKS, METRES
 from stages.prior.colors import CHANGES, COLORS, LEANINGS, TREATMENTS, changed, rgb
 from stages.prior.grammar import split
 from stages.prior.implied import BURNT
+from stages.prior.motifs import coat_of
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS
 from stages.prior.order import ROOFING, in_its_places, ordered
@@ -132,8 +133,9 @@ class Reading:
         base, over = ordered(phrases)
         layers = self._base_layers(base, {phrase.region for phrase in over})
         coat = layers.pop(0).coat
+        usual = len(layers)
         for phrase in over:
-            layers += self._over(phrase, coat, base)
+            layers += self._over(phrase, _ground(phrase, layers[usual:]) or coat, base)
         return Recipe(coat, tuple(primed(coat, _once(layers))), seed)
 
     def _phrases(self, prompt: str) -> list[Phrase]:
@@ -152,7 +154,9 @@ class Reading:
             inner, over = in_its_places(*ordered(made), base.thing)
             inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
             coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
-            parts = [layer for part in over if part.region not in said for layer in self._over(part, coat, inner)]
+            patterned = any(region and region.kind in PATTERNS for region in said)
+            usual = [p for p in over if p.region not in said and not (patterned and p.where in SHAPES)]
+            parts = [layer for part in usual for layer in self._over(part, coat, inner)]
             return [Layer(coat), *parts, *self._weather(inner)]
         coat = self._coat(base)
         if base.animal in PRINTED and not base.finish and (coat.roughness or 0.0) < MATT:
@@ -171,6 +175,9 @@ class Reading:
 
     def _over(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
         """What a phrase lays over the base."""
+        if phrase.join.kind == "except" and phrase.region and not phrase.says_what:
+            kept = self._coat(base.shows) if base.shows else beneath
+            return [Layer(kept, (phrase.region.mask(phrase.where),))]
         if not phrase.says_what:
             return self._more(phrase, beneath, base)
         coat = self._coat(phrase, beneath)
@@ -184,6 +191,8 @@ class Reading:
             _, marks, region = ANIMALS[phrase.animal]
             mark = _color(phrase) if phrase.colors else _triple(rgb(marks.split()[0]))
             marked = replace(beneath, color=mark, said=_said(phrase))
+            if phrase.region and phrase.where and phrase.where not in SHAPES:  # "a rifle with a camouflage stock"
+                return self._printed(phrase, beneath)
             return [Layer(marked, (region.mask(phrase.animal),))]
         mask = self._region(phrase).mask(phrase.where or phrase.part)
         if phrase.within and phrase.within.region:
@@ -196,6 +205,20 @@ class Reading:
             faded = replace(mask, size=FADE.size, wear=1.0) if aside else FADE.mask(phrase.where)
             mask = replace(faded, invert=bool(phrase.region) and mask.kind == "below")
         return [Layer(coat, (mask,), LAYERED.get(coat.look, 0.0)), *self._weather(phrase, (mask,), beneath)]
+
+    def _printed(self, phrase: Phrase, beneath: Coat) -> list[Layer]:
+        """An animal's coat, or camouflage, on a part."""
+        ground, marks, region = ANIMALS[phrase.animal]
+        assert phrase.region
+        place = phrase.region.mask(phrase.where)
+        coat = self._of(stuff(phrase.substance, False), phrase) if phrase.substance else beneath
+        coat = self._of(stuff("paint", False), phrase) if (coat.metallic or 0.0) > 0.5 else coat
+        color = _color(phrase) if phrase.colors else _triple(rgb(ground))
+        layers = [Layer(replace(coat, color=color, said=_said(phrase)), (place,))]
+        for k, mark in enumerate(marks.split()):
+            marked = replace(coat, color=_triple(rgb(mark)), said=f"{phrase.animal} marks")
+            layers.append(Layer(marked, (place, _scaled(region, 0.7**k).mask(phrase.animal))))
+        return layers
 
     def _more(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
         """A part of which only finish or wear is said: "polished edges", "dirty cracks"."""
@@ -210,7 +233,9 @@ class Reading:
         for word in _weathers(phrase):
             weather = WEATHER[word]
             coat = self._named(weather.stuff) if weather.stuff else self._beneath(base, None)
-            stains = (weather.region.mask(word),) if STAIN.search(word) else ()
+            drawn = STAIN.search(word) or weather.region.kind in ("veins", "scratches") or word in PEELS
+            drawn = drawn and where.kind not in ("edges", "crevices", "details")
+            stains = (weather.region.mask(word),) if drawn else ()
             layers.append(Layer(coat, (replace(where, wear=1.0), *stains), weather.thickness, weather.strength))
         return layers
 
@@ -245,7 +270,9 @@ class Reading:
         stand = phrase.thing or phrase.boards or phrase.substance in PATTERNED
         if (phrase.part or (stand and phrase.join.beneath)) and phrase.join.kind == "on":
             return PARTS["stand"]  # "a cannon on a wooden carriage"
-        if phrase.thing and phrase.colors and lives(phrase.thing) and phrase.join.kind in BESIDE:
+        if phrase.thing and phrase.colors and (lives(phrase.thing) or phrase.thing in ("crane", "star", "heart")) and (
+            phrase.join.kind in BESIDE
+        ):
             return SHAPES["motifs"]  # "a kimono with gold cranes"
         if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
             return DETAILS
@@ -272,12 +299,14 @@ class Reading:
             return self._of(stuff(named, any(map(is_hue, phrase.colors))), phrase)
         if of_part := _stuff_of_part(phrase, beneath):
             return self._of(stuff(of_part, True), phrase)
-        horny = phrase.animal in SHELLED and not beneath
+        horny = phrase.animal in SHELLED and not beneath and not (phrase.thing and lives(phrase.thing))
         if made and not horny and not (phrase.colors and beneath is not None and _drawn(split(made)[0], beneath)):
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
             inner.weather, inner.region, inner.where = phrase.weather, None, ""
             inner.substance = _painted(inner) if phrase.colors else inner.substance
+            if not inner.colors and RUSTED & set(phrase.weather) and _family(inner) in ("wood", "stone", "ceramic", "plastic"):
+                inner.substance = "iron"  # "a rusty chair"
             if inner.substance == "painted metal" and any(word in FINISHES_METAL for word in inner.finish):
                 inner.substance = "paint"
             return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
@@ -286,15 +315,15 @@ class Reading:
         if beneath is not None and phrase.colors:  # of the same stuff
             kind = self._region(phrase).kind
             raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone") and beneath.look not in ("straw", "wicker")
-            look = "paint" if beneath.metallic or (raw and kind not in ("veins", "spots", "patches")) else beneath.look
+            shade = not any(word in COLORS or word.startswith("#") for word in phrase.colors)  # darker than its own
+            coated = beneath.metallic or (raw and kind not in ("veins", "spots", "patches"))
+            look = "paint" if coated and not shade else beneath.look
             metallic = 0.0 if look == "paint" else beneath.metallic
             rough = _roughness(phrase, bool(metallic)) or (0.35 if look == "paint" else beneath.roughness)
             look = look_of(stuff("paint", True), available=self._looks) if look == "paint" else look
             return replace(beneath, color=_color(phrase), look=look, metallic=metallic, roughness=rough, said=_said(phrase))
         if phrase.animal:
-            name = "glossy plastic" if phrase.animal in SHELLED else "cotton" if phrase.animal in PRINTED else "fur"
-            hard = phrase.animal in PRINTED and made and _family(split(made)[0]) in ("metal", "plastic", "paint")
-            return self._of(stuff("paint" if hard else name, False), phrase)
+            return self._of(stuff(coat_of(phrase.animal, phrase.thing), False), phrase)
         weathers = [WEATHER[word].stuff for word in _weathers(phrase) if WEATHER[word].stuff]
         name = "paint" if phrase.colors else weathers[0] if weathers else UNSAID
         if weathers and not phrase.colors:
@@ -440,12 +469,18 @@ class Reading:
 def _stuff_of_part(phrase: Phrase, beneath: Coat | None) -> str:
     """What a part is made of of which words name the colour alone, or "". Args: beneath: what it is on, None for a whole."""
     said = phrase.where or phrase.part or (phrase.thing if beneath is not None else "")
-    soft = beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal", "ice")
+    straw = beneath is not None and beneath.look in ("straw", "wicker", "bristles")
+    soft = straw or (beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal", "ice"))
     hard = beneath is not None and _family_of(beneath.look) in ("metal", "wood", "stone", "ceramic", "paint", "gem")
     cloth = beneath is not None and _family_of(beneath.look) in ("fabric", "leather")
-    sorts = ("", *(["soft"] if soft else []), *(["hard"] if hard else []), *(["cloth"] if cloth else []))
+    beast = beneath is not None and beneath.look in PELTS
+    sorts = ["", *(name for name, is_it in zip(SORTS, (straw, beast, soft, hard, cloth), strict=True) if is_it)]
     found = (MADE.get((name, sort), "") for name in (said, said.split(" ")[-1]) for sort in sorts)
     return next(filter(None, found), "") if phrase.colors else ""
+
+
+SORTS = ("straw", "beast", "soft", "hard", "cloth")
+"""What parts are on that are of other stuffs there, as parts_made.tsv has it."""
 
 
 def _kin(phrase: Phrase, usual: Phrase) -> bool:
@@ -460,14 +495,29 @@ def _drawn(made: Phrase, beneath: Coat) -> bool:
     """Whether what is named on a thing, with its colour, is not of its own stuff there: the keys of a toy, cranes on silk."""
     kind = KNOWN[made.substance][0].family if made.substance else ""
     alive = bool(made.substance) and KNOWN[made.substance][0].look in LIVING
-    return kind in ("metal", "stone", "gem") or (alive and _family_of(beneath.look) != "organic")
+    cloth = kind == "paint" and _family_of(beneath.look) == "fabric"
+    return cloth or kind in ("metal", "stone", "gem") or (alive and _family_of(beneath.look) != "organic")
 
+
+
+def _ground(phrase: Phrase, layers: list[Layer]) -> Coat | None:
+    """What a pattern lies on that is on a part of which is told, if anything."""
+    part = phrase.within.where if phrase.within else ""
+    named = (layer.coat for layer in reversed(layers) if part and len(layer.masks) == 1 and layer.masks[0].said == part)
+    return next(named, None)
+
+
+PATTERNS = ("stripes", "bands", "checks", "zigzag", "gingham", "dots")
+"""Kinds of patterns of which a thing has one: its usual is not there where words tell of another."""
 
 
 def strands(phrase: Phrase) -> bool:
     """Whether a phrase is of something long and thin, which lies around a thing."""
     return phrase.substance.split(" ")[-1] in STRANDS
 
+
+RUSTED = frozenset(["rusty", "rusted", "rusting"])
+"""Words that say that what they tell of is of iron."""
 
 STRANDS = ("ribbon", "ribbons", "cord", "cords", "rope", "ropes", "string", "twine", "strips")
 
@@ -487,7 +537,8 @@ def _painted(made: Phrase) -> str:
     if not hues or (made.substance in DYED_METALS and named[0] < WHITE):
         return made.substance  # no white is anodised
     grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH) and named[0] < WHITE
-    same = own.family == "wood" and float(np.linalg.norm(named - usual)) < SIMILAR and named[1] > -GREYISH / 2  # nor green
+    tinted = own.family == "wood" or float(np.hypot(*usual[1:])) > GREYISH
+    same = tinted and float(np.linalg.norm(named - usual)) < SIMILAR and named[1] > -GREYISH / 2  # nor green
     return made.substance if grey or same else "painted wood" if own.family == "wood" else "painted metal"
 
 
@@ -522,8 +573,8 @@ def _greenish(phrase: Phrase) -> bool:
 PELTS = ("fur", "feathers")
 """Looks whose colour is that of the beast: a bear of faux fur is as brown as one of fur."""
 
-DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "gold", "silver", "brass", "bronze", "copper", "chrome"])
-"""Metals that take colour as metals, or have their own."""
+DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "chrome"])
+"""Metals that take colour as metals."""
 
 GREYISH, WHITE = 0.04, 0.9
 """Chroma and lightness in OKLab below which a colour may be that of a bare metal."""

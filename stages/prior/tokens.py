@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS, LIKENED
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS, rows, words
-from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET, WORN, Region
+from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, PARTS_OF, SHAPES, WEATHER, WET, WORN, Region
 from stages.prior.sizes import TIMES
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF
 
@@ -206,17 +206,22 @@ SIMILES = (
     (r"\bwhite-?washed (?=brick|stone|rock)", "white "),
     (r"\bwhite-?washed (?=[a-z])", "white painted "),
     (r"\bcamouflage in ([a-z]+) (?:tones|colou?rs|shades)\b", r"\1 camouflage"),
-    (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ )?paint\b)", "peeling "),
+    (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ ){0,3}paint\b)", "peeling "),
+    (r"\b(?:multi-?colou?red|colou?rful)\b", "rainbow patches"),
     (r"\bwith (?:an? |the )?(?:wooden |wood )?(?:plank|board|formwork) (?:imprints?|marks|texture|lines)\b", ""),
     (r"\bglowing (cracks|veins|fissures)\b", r"bright orange \1"),
     (r"\b(?:gone|turned) green with (?:verdigris|patina|age)\b", "covered in verdigris"),
-    (r"\b(?:blue and white )?(?:delft|willow pattern|chinoiserie)(?:ware)?(?: blue)?(?: pottery| porcelain| china)? "
-     r"([a-z]+)\b", r"\1 in white glazed ceramic with cobalt blue motifs"),
+    (r"\b(?:blue and white )?(?:delft|willow[- ]pattern|blue willow|chinoiserie)(?:ware)?(?: blue)?(?: pattern)?"
+     r"(?: pottery| porcelain| china| ware)? ([a-z]+(?: [a-z]+)?)(?=$|[,.;]| with | on | and )",
+     r"\1 in white glazed ceramic with cobalt blue motifs"),
     (r"\b(?:multi)?colou?red (?:chips|specks|flecks)\b", "sprinkles"),
     (r"\bblue and white (?=willow)", ""),
     (r"\bpowder coated\b(?! in| with)", "powder-coated"),
     (r"\b([a-z]+) and ([a-z]+) marbled ([a-z]+(?: [a-z]+)?)(?=$|[,.;]| with | and )", r"\1 \3 swirled with \2"),
     (r"\b([a-z]+) and ([a-z]+) marbled\b", r"\1 and \2 swirled"),
+    (r"\b(peeling|flaking|chipping|wearing|coming|crumbling|falling|breaking|cracking|rubbing|scraping|shedding|lifting|curling|"
+     r"sloughing|peeled|flaked|crumbled|worn|rubbed|scraped|fallen)(?: away from| away off| off of| off from| from)\b",
+     r"\1 off"),
     (rf"\b{TURNED} to (?:an? )?(?=(?:[a-z]+ )?(?:{HUES})\b)", ""),
     (rf"\b{TURNED} (?:by|with|from|in|through) (?:the |many )?(?:{HANDS})(?: and (?:the )?(?:{HANDS}))?\b", r"\1"),
     (rf"\b(?:by|from|through) (?:the |many |years of )?(?:{HANDS})\b", ""),
@@ -385,7 +390,7 @@ def _names_stuff(text: str) -> bool:
 
 def _worth(text: str) -> bool:
     token = _table()[0].get(text)
-    short = token is not None and (token.kind == "thing" or (token.kind == "part" and len(text) < LONG))
+    short = token is not None and (token.kind == "thing" or (token.kind in ("part", "shape") and len(text) < LONG))
     return token is not None and not short and token.kind not in ("filler", "join", "size", "half")
 
 
@@ -431,6 +436,10 @@ def _resolved(found: list[Token]) -> list[Token]:
     """Words that are both a colour and a thing or a substance are colours where another says what has it."""
     result: list[Token] = []
     for number, token in enumerate(found):
+        if _depicts(token, result):
+            while result[-1].kind != "thing" or any(t.kind == "thing" for t in result[:-1]):
+                result.pop()
+            result.pop()  # "a knight on horseback statue"
         ahead = _run(found[number + 1 :])
         if token.text == "stained" and result and _stained(result[-1], found[number + 1 :]):
             result[-1] = result[-1]._replace(kind="color", value=None)
@@ -448,6 +457,9 @@ def _resolved(found: list[Token]) -> list[Token]:
             continue  # "candy apple red paint"
         if _holds(token, result, found[number + 1 :]) or _serves(token, ahead):
             continue  # "a tin biscuit box", "a tea bowl"
+        if token.kind == "thing" and result and ahead and ahead[0].text in HAIR and OBJECTS[token.text].made.endswith("fur"):
+            result += _hues_of(token.text)
+            continue  # "a brush of badger hair"
         if token.text in COLORS and token.kind in ("substance", "thing"):
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)
             if token.text in KNOWN and KNOWN[token.text][0].family != "gem":
@@ -456,22 +468,72 @@ def _resolved(found: list[Token]) -> list[Token]:
                 names = set()  # "an emerald brooch"
             if names or shaped or any(t.kind == "substance" for t in behind):
                 token = token._replace(kind="color", value=None)
-        if token.kind == "color" and token.article and not ahead and token.text in OBJECTS:
+        named = token.article or (any(t.article for t in behind) and any(t.text in COMMON for t in behind))
+        if token.kind == "color" and named and not ahead and token.text in OBJECTS:
             token = token._replace(kind="thing", value=None)  # "an orange"
+        elif place := _own_part(token, result):
+            token = Token("part", token.text, place)  # "a drum with a white skin"
         elif token.text in ("shell", "carapace") and any(t.text in BEARERS for t in result):
             token = Token("part", "carapace", PARTS["carapace"])
         elif token.text == "shell" and any(t.kind in ("thing", "part") for t in result):
             token = Token("part", "body", PARTS["body"])  # "a helmet with a white shell"
         elif token.kind == "thing" and token.text in KNOWN and _is_stuff(token, ahead, behind):
             token = token._replace(kind="substance", value=None)
+        elif token.text == "diamonds" and (not (behind and _hue(behind[0])) or any(map(_is_jewel, result))):
+            token = Token("substance", "diamonds", KNOWN["diamonds"])  # "studded with diamonds"
         elif token.kind == "shape" and token.text in OBJECTS and not ahead and _opens(token, result):
             token = token._replace(kind="thing", value=None)  # "a silver ring"
         elif token.kind == "part" and token.text in WORN & OBJECTS.keys() and not any(t.kind == "thing" for t in result):
             token = token._replace(kind="thing", value=None)  # "faded jeans"
         elif token.kind == "thing" and token.text in PARTS and (result or ahead):
             token = Token("part", token.text, PARTS[token.text])
+        elif token.kind == "thing" and not ahead and (place := PARTS.get(f"{token.text}s")) and _is_had(result, behind, place):
+            token = Token("part", token.text, place)  # "a barrow with a rubber tyre"
         result.append(token)
     return result
+
+
+def _is_had(before: list[Token], behind: list[Token], place: Region) -> bool:
+    """Whether what stands after these is had by the thing among them, at a place of its own."""
+    if place.kind in ("edges", "details"):
+        return False
+    join = next((t for t in reversed(before) if t.kind in ("join", "comma")), Token("", ""))
+    joined = join.kind == "comma" or (join.kind == "join" and join.value.kind in ("with", "and"))
+    return joined and any(t.kind == "thing" for t in before) and not any(t.kind == "thing" for t in behind)
+
+
+def _own_part(token: Token, before: list[Token]) -> Region | None:
+    """Where a skin lies of which the thing that was named first has one, as a drum has."""
+    thing = next((t.text for t in before if t.kind == "thing"), "")
+    places = PARTS_OF.get(thing) or PARTS_OF.get(thing.split(" ")[-1], {})
+    return places.get(token.text) if token.kind in ("substance", "thing") and token.text in OUTSIDES else None
+
+
+OUTSIDES = ("skin", "hide", "rind", "crust", "shell", "peel", "husk", "horn", "bell")
+"""Names of stuffs that are parts of things, too."""
+
+
+def _depicts(token: Token, before: list[Token]) -> bool:
+    """Whether a thing is an image of all that was named before."""
+    if token.kind != "thing" or token.article or token.text.split(" ")[-1] not in IMAGES:
+        return False
+    at = next((k for k, t in enumerate(before) if t.kind == "thing"), len(before))
+    named = (t.kind in ("thing", "unknown") or t.text in ("on", "with", "and", "of") for t in before[at:])
+    return len(before) > at + 1 and all(named)
+
+
+HAIR = ("hair", "fur", "bristles", "pelt")
+"""What is that of the beast that is named before it."""
+
+def _hue(token: Token) -> bool:
+    return token.kind == "color" or token.text in LENT
+
+
+LENT = ("gold", "silver", "copper", "bronze", "ivory", "coral", "cream", "rust", "turquoise", "jade", "emerald")
+"""Stuffs that stand for their colours in a list of colours."""
+
+IMAGES = ("statue", "statuette", "figurine", "sculpture", "figure", "bust", "carving", "ornament", "miniature", "monument")
+"""Things that are images of others."""
 
 
 def _only_tells_how(token: Token, before: list[Token], ahead: list[Token]) -> bool:
@@ -556,7 +618,8 @@ BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beet
 def _opens(token: Token, before: list[Token]) -> bool:
     """Whether a token ends the first run, which an article opens."""
     whole = [*before, token]
-    return whole[0].article == "a" and all(t.kind in ("color", "finish", "weather", "size", "substance") for t in before)
+    opened = whole[0].article == "a" or not before
+    return opened and all(t.kind in ("color", "finish", "weather", "size", "substance") for t in before)
 
 
 def _is_jewel(token: Token) -> bool:
