@@ -108,11 +108,16 @@ def _takes_wear(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
             if painted.coats or painted.color_only:
                 _add(painted.weather, phrase.weather)
     elif _wears(before, phrase):
+        if phrase.coats and phrase.region and phrase.where in PARTS and phrase.region.kind not in ("edges", "crevices", "all"):
+            whole = before if before.coats or before.color_only else result[0]
+            result.append(replace(phrase, substance="", colors=[], finish=[], shows=whole.shows))
+            return True  # "a stool painted blue, paint flaking off the seat"
         if phrase.coats and not before.coats:  # "a white fence with flaking paint"
             before.shows = phrase.shows or Phrase(substance=before.substance, thing=before.thing)
             if before.metal:  # "a red metal toolbox, the paint chipped"
                 before.substance = "painted metal"
-        worn = result[0] if phrase.join.kind == "comma" and before.region and not phrase.coats else before
+        laid = bool(before.region or gathering(before.substance))  # "with moss around the base and water stains"
+        worn = result[0] if phrase.join.kind in ("comma", "and") and laid and not phrase.coats else before
         _add(worn.weather, phrase.weather or [WEARS[phrase.where]])  # "..., steel joints, some scratches"
     else:
         return False

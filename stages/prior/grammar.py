@@ -5,6 +5,7 @@ join them ("with", "covered in", "peeling off"); parts ("sole", "rim") and patte
 no table knows, a dictionary may explain by colours; the rest is kept as unknown. """
 
 from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import replace
 from itertools import takewhile
 
 from stages.prior.colors import COLORS
@@ -51,6 +52,9 @@ def split(
         halved = now.join.kind == "half" and token.kind == "part" and token.text in OBJECTS and now.says_what
         if alone or halved or (article == "a" and _is_painted(token, phrases)):
             token = Token("thing", token.text)
+        pair = now.join.kind == "and" and any(map(is_hue, phrases[-2].colors)) and not phrases[-2].region
+        if pair and article != "a" and token.text in ("stripe", "racing stripe"):
+            token = token._replace(value=SHAPES["stripes"])  # "in blue and white ticking stripe"
         if token.kind == "weather":
             now.amount[token.text] = much
         elif token.kind in ("substance", "postfix") and much != 1:
@@ -66,6 +70,10 @@ def split(
             within = starts or (within and token.kind not in ("join", "postfix", "comma", "half"))
             if token.kind in ("join", "postfix", "comma", "half"):
                 continue
+            if token.kind == "part" and len(phrases) == 1 and _told_of_part(tokens[: number + 1]):
+                named = Phrase(size=now.size, thing=now.thing)  # "a bowl gold inside"
+                now = replace(now, join=Join("with"), thing="", size=[])
+                phrases = [named, now]
             begins = _begins(token, now) and not (within and _lacks(token, now))
             if begins or _paints_part(token, now, tokens[number + 1 :]):
                 now = Phrase(Join("paint" if token.text in PAINTED else "with"))
@@ -175,6 +183,13 @@ def _begins(token: Token, now: Phrase) -> bool:
     return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS and text in PARTS))
 
 
+def _told_of_part(run: Sequence[Token]) -> bool:
+    """Whether what stands between a thing and a part of it is that of the part."""
+    kinds = [token.kind for token in run if token.kind not in ("size", "name", "unknown")]
+    said = kinds[1:-1]
+    return kinds[:1] == ["thing"] and bool(said) and set(said) <= {"color", "substance", "finish"} and {*said} != {"finish"}
+
+
 def _paints_part(token: Token, now: Phrase, after: Sequence[Token]) -> bool:
     """Whether what is painted is a part of a thing only: "a brick wall painted white on the lower half"."""
     run = list(takewhile(lambda t: t.kind not in ("join", "comma", "half", "postfix"), after))
@@ -222,10 +237,9 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         if text not in said:
             said.append(text)
         phrase.palette = token.value if kind == "color" and token.value else phrase.palette
-    elif kind == "part" and phrase.thing and phrase.join is FIRST and text in OBJECTS and lives(phrase.thing):
-        phrase.thing = text  # "a hobbit door"
     elif kind == "part" and phrase.thing and phrase.join is FIRST:
-        return  # "a bicycle frame" is all frame
+        if text in OBJECTS and (lives(phrase.thing) or text in DOORS):
+            phrase.thing = text  # "a hobbit door", "a garage door"; but "a bicycle frame" is all frame
     elif kind == "part" and text in PARTS and phrase.where in SHAPES and phrase.says_what:
         if early and phrase.join.kind in ("", "and"):
             return  # "a checkerboard marble plinth", "blue and white gingham cushion"
@@ -254,6 +268,10 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.part = text
     elif kind == "animal":
         phrase.animal = text
+
+
+DOORS = ("door", "gate", "window")
+"""Parts that are all of which is spoken where the name of what has them stands before."""
 
 
 def _laid_on(phrase: Phrase) -> bool:
@@ -308,6 +326,8 @@ def _name(phrase: Phrase, text: str) -> None:
         return  # "green tartan wool"
     elif old in ("twill", "herringbone"):
         phrase.substance = text  # "twill carbon fibre"
+    elif family(old) == "wood" and KNOWN[text][0].look == "leaves":
+        phrase.substance = text  # "oak leaves"
     elif text in FIGURES and old not in (*GENERIC, *PAINTED):  # "a brass horn", "with an obsidian hide"
         if phrase.join is not FIRST and phrase.region is None:
             phrase.region, phrase.where = (PARTS["body"], "body") if text in COATS else (DETAILS, text)

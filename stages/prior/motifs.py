@@ -216,8 +216,15 @@ def _shared_between(whole: Phrase, marks: Phrase) -> bool:
 def _both_of(first: Phrase, second: Phrase) -> bool:
     """Whether a thing of two colours is of the stuff that is named after the second: "a chair in black and red leather"."""
     dyed = first.thing and not (first.substance or first.region or first.animal) and any(map(is_hue, first.colors))
-    other = second.substance and any(map(is_hue, second.colors)) and not (second.region or second.thing or second.part)
-    return bool(dyed and other) and second.join.kind == "and" and family(second.substance) in ("leather", "fabric", "plastic")
+    hue, _, stuff = second.substance.partition(" ")  # "white marble"
+    hued = any(map(is_hue, second.colors)) or (hue in COLORS and stuff in KNOWN)
+    other = second.substance and hued and not (second.region or second.thing or second.part)
+    return bool(dyed and other) and second.join.kind == "and" and family(second.substance) in SHARING
+
+
+SHARING = ("leather", "fabric", "plastic", "stone", "ceramic")
+"""Families of stuffs of which a thing of two colours is, where they are named with the second only."""
+
 
 
 def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
@@ -228,7 +235,8 @@ def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
         if first.join.kind == second.join.kind == "half":
             first.region, first.where = Region("left", 0.5), "half"
         if number == 0 and _both_of(first, second):
-            first.substance = second.substance
+            *_, last = second.substance.split(" ")
+            first.substance = second.substance if second.colors else last
         if not first.color_only or first.region or first.part or second.join.kind not in ("and", "comma", "fade", "half"):
             continue
         second.finish = second.finish or list(first.finish)
@@ -237,6 +245,8 @@ def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
         said = second.substance and (second.colors or same)
         if said and second.where not in PARTS:
             first.substance, first.boards = second.substance, second.boards
+        if number == 0 and second.join.kind == "and" and second.thing and said and not (second.region or second.animal):
+            second.region = SHAPES["patches"]  # "a blue and white enamel mug"
         ground = second.within
         if ground and ground.region and second.join.kind == "and":  # "with a red and white striped awning"
             first.region, first.where, second.join = ground.region, ground.where, Join("with")

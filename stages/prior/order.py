@@ -219,7 +219,8 @@ def _of_usual(phrase: Phrase, thing: Phrase) -> bool:
     usual = split(OBJECTS[thing.thing].made)[0]
     if phrase.join.kind != "with" or not (usual.substance and phrase.substance) or gathering(phrase.substance):
         return False
-    kin = family(phrase.substance) == family(usual.substance)
+    kin = "wood" in (usual.substance, usual.substance.split(" ")[-1]) and phrase.boards  # "a barn with red boards"
+    kin |= family(phrase.substance) == family(usual.substance)
     same = phrase.boards or KNOWN[phrase.substance][0].look == KNOWN[usual.substance][0].look
     whole = kin and (same or family(usual.substance) in SKINS)
     return whole and not (set(phrase.weather) & PEELS or phrase.thing or phrase.part)
@@ -260,6 +261,14 @@ def _either_side(first: Phrase, over: list[Phrase]) -> Order:
 def region_of(phrase: Phrase) -> str:
     """The kind of place where a phrase lies, if that is said."""
     return phrase.region.kind if phrase.region else ""
+
+
+def _fading(first: Phrase, over: list[Phrase]) -> Order:
+    """What a thing is at one end is what it is, where it fades into something else: "blue at the bottom fading to white"."""
+    ends = len(over) > 1 and over[1].join.kind == "fade" and region_of(over[0]) in ("below", "above")
+    if first.thing and not first.says_stuff and ends and over[0].says_stuff and not over[0].thing:
+        return replace(over[0], thing=first.thing, region=None, where="", join=first.join), over[1:]
+    return first, over
 
 
 def _bared(first: Phrase, over: list[Phrase]) -> Order:
@@ -344,7 +353,7 @@ def _edges_apart(first: Phrase, over: list[Phrase]) -> Order:
 
 
 STEPS = (
-    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _flanked, _of_body, _told_after, _either_side,
+    in_its_places, _largest, _framed, _panelled, _clothed, _flaked, _flanked, _of_body, _told_after, _fading, _either_side,
     _bared, _smaller_last, _dirt_last, _edges_apart,
 )  # fmt: skip
 """What orders phrases, one after the other."""

@@ -65,7 +65,8 @@ class Phrase:
     @property
     def coats(self) -> bool:
         """Whether it is a thin coat on something, such as paint."""
-        return bool(self.substance) and (family(self.substance) == "paint" or self.substance in COATINGS)
+        coating = self.substance in COATINGS or self.substance.startswith("gilded ")
+        return bool(self.substance) and (family(self.substance) == "paint" or coating)
 
     @property
     def metal(self) -> bool:

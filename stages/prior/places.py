@@ -102,6 +102,7 @@ GATHERS = _places("gathers")
 """What gathers of itself, and where it does when nobody says."""
 
 ONCE = {**dict.fromkeys(("ice cream", "strawberry ice cream", "chocolate ice cream", "mint ice cream"), "icing"),
+        **dict.fromkeys(("fungus", "fungi", "toadstools", "bracket fungus"), "mushrooms"),
         "lichens": "lichen", "vine": "ivy", "hedge": "ivy", "creepers": "ivy", "creeper": "ivy", "soil": "dirt",
         "earth": "dirt", "dried mud": "mud", "cracked mud": "mud", "dried blood": "blood", "powdered sugar": "icing sugar",
         "hard water stains": "limescale", "calcium deposits": "limescale", "droppings": "bird droppings",

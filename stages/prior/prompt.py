@@ -314,6 +314,10 @@ class Reading:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
         if beneath is not None and phrase.colors:  # of the same stuff
             kind = self._region(phrase).kind
+            made_of = CORRODES.get(beneath.look.split(" ")[-1]) if beneath.metallic else ""
+            stained = kind in ("streaks", "patches", "crevices") and phrase.color_only
+            if made_of == "verdigris" and stained and _greenish(phrase):
+                return self._named("verdigris")  # "a copper still with green streaks"
             raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone") and beneath.look not in ("straw", "wicker")
             shade = not any(word in COLORS or word.startswith("#") for word in phrase.colors)  # darker than its own
             coated = beneath.metallic or (raw and kind not in ("veins", "spots", "patches"))

@@ -110,6 +110,7 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
         token, length = (alone, 1) if alone else _longest(heard, at)
         if token is None and (again := _respelt(heard[at], explained, real)):
             heard[at : at + 1] = again
+            found, at, article = [], 0, ""  # for it may belong to words before it: "desert camoflage"
             continue
         if token is None:
             found += [part._replace(article=article) for part in _explained(heard[at], explained)]
@@ -190,7 +191,7 @@ SIMILES = (
     (r",? half[- ](?:dipped|submerged|buried) in\b", ", lower half"),
     (r"(?:,| with| in)(?: an?)? ((?:light |dark |medium |warm |deep |rich )?)"
      r"(?!coffee|water|blood|rust|grass|oil|wine|ink|tea|dirt)([a-z]+) stain\b", r", \1\2 coloured"),
-    (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot|holder|saucer)\b",
+    (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot|holder|saucer|basket)\b",
      r"with a \1\2 at the lower third"),
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
     (r"\b(?:burnt|burned|scorched|charred) and blackened\b", "charred"),
@@ -208,6 +209,10 @@ SIMILES = (
     (r"\bcamouflage in ([a-z]+) (?:tones|colou?rs|shades)\b", r"\1 camouflage"),
     (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ ){0,3}paint\b)", "peeling "),
     (r"\b(?:multi-?colou?red|colou?rful)\b", "rainbow patches"),
+    (r"\b(?:bright |in )?(?:the )?primary colou?rs\b", "in red, yellow and blue"),
+    (r"\b(?:soft )?pastel colou?rs\b", "pastel pink, pastel blue and pastel yellow"),
+    (r"\bautumn(?:al)? (?:colou?rs|tones|shades)\b", "autumn leaves coloured"),
+    (r"\b(?:two|2)[- ]ton(?:e|ed) ", ""),
     (r"\bwith (?:an? |the )?(?:wooden |wood )?(?:plank|board|formwork) (?:imprints?|marks|texture|lines)\b", ""),
     (r"\bglowing (cracks|veins|fissures)\b", r"bright orange \1"),
     (r"\b(?:gone|turned) green with (?:verdigris|patina|age)\b", "covered in verdigris"),
@@ -371,7 +376,19 @@ def _respelt(word: str, explained: Container[str], real: Container[str]) -> list
             return [first, *([] if second in ENDINGS else [second])]
     if any(one in real for one in (word, *singulars(word))):
         return []
-    return next(([slip] for slip in _slips(word) if slip[:1] == word[0] and _worth(slip) and not _derived(word, slip)), [])
+    known = {stem for stem in _stems(word) if stem in real}  # "potted" is of a pot
+    slips = (slip for slip in _slips(word) if slip[:1] == word[0] and _worth(slip) and not _derived(word, slip))
+    return next(([slip] for slip in slips if not known or known & set(_stems(slip))), [])
+
+
+def _stems(word: str) -> list[str]:
+    """What a word may be made of by an ending: "potted" of pot."""
+    cut = [word.removesuffix(end) for end in ("ed", "ing", "er", "y", "ly", "s") if word.endswith(end)]
+    return [stem for c in cut if len(c) > LEAST_STEM for stem in (c, f"{c}e", c[:-1] if c[-1] == c[-2] else c)]
+
+
+LEAST_STEM = 2
+"""Letters of the shortest stem, less one."""
 
 
 def _derived(word: str, slip: str) -> bool:
@@ -455,9 +472,12 @@ def _resolved(found: list[Token]) -> list[Token]:
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
             continue  # "candy apple red paint"
+        if token.kind == "substance" and KNOWN[token.text][0].family == "wood" and ahead and ahead[0].text in TREES:
+            continue  # "a birch tree"
         if _holds(token, result, found[number + 1 :]) or _serves(token, ahead):
             continue  # "a tin biscuit box", "a tea bowl"
-        if token.kind == "thing" and result and ahead and ahead[0].text in HAIR and OBJECTS[token.text].made.endswith("fur"):
+        haired = token.kind == "thing" and result and ahead and ahead[0].text in HAIR
+        if haired and OBJECTS[token.text].made.split(" with ")[0].endswith("fur"):
             result += _hues_of(token.text)
             continue  # "a brush of badger hair"
         if token.text in COLORS and token.kind in ("substance", "thing"):
@@ -477,7 +497,7 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = Token("part", "carapace", PARTS["carapace"])
         elif token.text == "shell" and any(t.kind in ("thing", "part") for t in result):
             token = Token("part", "body", PARTS["body"])  # "a helmet with a white shell"
-        elif token.kind == "thing" and token.text in KNOWN and _is_stuff(token, ahead, behind):
+        elif token.kind == "thing" and token.text in KNOWN and _is_stuff(token, ahead, behind) and not _consists(found, number):
             token = token._replace(kind="substance", value=None)
         elif token.text == "diamonds" and (not (behind and _hue(behind[0])) or any(map(_is_jewel, result))):
             token = Token("substance", "diamonds", KNOWN["diamonds"])  # "studded with diamonds"
@@ -502,6 +522,12 @@ def _is_had(before: list[Token], behind: list[Token], place: Region) -> bool:
     return joined and any(t.kind == "thing" for t in before) and not any(t.kind == "thing" for t in behind)
 
 
+def _consists(found: list[Token], number: int) -> bool:
+    """Whether it is said what a thing is of: "a rug of sheepskin"."""
+    join, stuff = (*found[number + 1 : number + 3], Token("", ""), Token("", ""))[:2]
+    return join.text in ("of", "in") and stuff.kind == "substance"
+
+
 def _own_part(token: Token, before: list[Token]) -> Region | None:
     """Where a skin lies of which the thing that was named first has one, as a drum has."""
     thing = next((t.text for t in before if t.kind == "thing"), "")
@@ -509,7 +535,7 @@ def _own_part(token: Token, before: list[Token]) -> Region | None:
     return places.get(token.text) if token.kind in ("substance", "thing") and token.text in OUTSIDES else None
 
 
-OUTSIDES = ("skin", "hide", "rind", "crust", "shell", "peel", "husk", "horn", "bell")
+OUTSIDES = ("flesh", "skin", "hide", "rind", "crust", "shell", "peel", "husk", "horn", "bell")
 """Names of stuffs that are parts of things, too."""
 
 
@@ -522,6 +548,9 @@ def _depicts(token: Token, before: list[Token]) -> bool:
     return len(before) > at + 1 and all(named)
 
 
+TREES = ("tree", "trees", "forest", "sapling", "hedge", "bush", "grove", "woodland")
+"""What grows of the tree that is named before it."""
+
 HAIR = ("hair", "fur", "bristles", "pelt")
 """What is that of the beast that is named before it."""
 
@@ -529,7 +558,7 @@ def _hue(token: Token) -> bool:
     return token.kind == "color" or token.text in LENT
 
 
-LENT = ("gold", "silver", "copper", "bronze", "ivory", "coral", "cream", "rust", "turquoise", "jade", "emerald")
+LENT = ("gold", "amber", "silver", "copper", "bronze", "ivory", "coral", "cream", "rust", "turquoise", "jade", "emerald")
 """Stuffs that stand for their colours in a list of colours."""
 
 IMAGES = ("statue", "statuette", "figurine", "sculpture", "figure", "bust", "carving", "ornament", "miniature", "monument")
@@ -540,7 +569,8 @@ def _only_tells_how(token: Token, before: list[Token], ahead: list[Token]) -> bo
     """Whether a word says nothing of the stuff beside those of its run: "herringbone brick", "left unglazed"."""
     after = ahead[0] if ahead else Token("end", "")
     if token.text in ("herringbone", "twill"):
-        return any(t.text in KNOWN and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in ahead)
+        beside = ahead or before
+        return any(t.text in KNOWN and KNOWN[t.text][0].family in ("stone", "wood", "ceramic") for t in beside)
     if token.text in SPELLS:
         return after.kind == "thing" and not before  # "a frost sword"
     if token.text in SHAPES and token.kind == "postfix":
@@ -557,12 +587,16 @@ def _of_its_name(token: Token, before: list[Token], ahead: list[Token], behind: 
     thing = token.kind == "thing" and not (token.article or ahead)
     after = bool(behind) and all(t.kind in ("finish", "color") for t in behind)
     named = after and any(t.kind == "thing" for t in before)  # "a beetle, glossy chestnut"
-    hide = HIDES.get(token.text) if thing else None
-    if hide and before and before[-1].text in ("in", "of"):
+    hide = HIDES.get(token.text)
+    if hide and ahead and ahead[0].text in ("skin", "hide", "leather") and token.kind in ("thing", "unknown"):
+        return token._replace(kind="substance", text=hide, value=KNOWN[hide])  # "white ray skin"
+    if hide and thing and before and before[-1].text in ("in", "of"):
         return token._replace(kind="substance", text=hide, value=KNOWN[hide])
     if thing and token.text in COLORS and before and (before[-1].text == "in" or named):
         return token._replace(kind="color", value=None)
-    if token.text in TIMBER and _of_timber(token.text, ahead[:2]):
+    bare = not ahead and not any(t.kind in ("substance", "color") for t in before)
+    wooden = bare and any(map(_of_wood, before)) and before[-1].text in (",", "in", "of", *FINISH_LOOKS)
+    if token.text in TIMBER and (wooden or _of_timber(token.text, ahead[:2])):
         return Token("substance", f"{token.text} wood")
     return token
 
@@ -585,7 +619,8 @@ HAIRY = ("fur", "skin", "feathers", "straw")
 """Metals that lend their colour to what stands after them, and the looks of what has it."""
 
 HIDES = {
-    "stingray": "shagreen", "shark": "shagreen", "ostrich": "ostrich leather", "python": "python leather", "eel": "eelskin",
+    "stingray": "shagreen", "shark": "shagreen", "ray": "shagreen", "ostrich": "ostrich leather",
+    "python": "python leather", "eel": "eelskin",
     "crocodile": "crocodile leather", "alligator": "crocodile leather", "lizard": "lizard leather", "snake": "snakeskin",
     "goat": "goatskin", "sheep": "sheepskin", "lamb": "lambskin", "deer": "deerskin", "buffalo": "buffalo leather",
     "kangaroo": "kangaroo leather", "rabbit": "rabbit fur", "fox": "fox fur", "alpaca": "alpaca wool",
