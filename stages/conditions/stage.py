@@ -56,7 +56,7 @@ from stages.light.exchange import Between
 from stages.light.gbuffer import GBuffer, trace_view
 from stages.light.lights import BUILTIN
 from stages.light.scene import Scene
-from stages.light.terms import GLTF
+from stages.light.terms import BOUNCED
 from stages.light.transport import QUALITY, Quality, transport_and_ends
 from stages.material.survey import make_survey
 
@@ -359,7 +359,7 @@ def bounces_arrays(between: Between, subject: Subject, quality: Quality) -> dict
     arrays = {"weight": exchange.weight, "angle": exchange.angle, "direct": exchange.direct, **exchange.ends.to_arrays()}
     arrays |= {"cell_point": shown[:, :3].copy(), "cell_normal": shown[:, 3:6].copy(), "cell_scale": shown[:, 6].copy()}
     arrays |= {"cell_label": subject.label[triangle], "cell_width": np.array(cells.width, np.float32)}
-    return arrays | {"lobe_rays": GLTF.counts(quality.lobe).astype(np.int32)}
+    return arrays | {"lobe_rays": BOUNCED.counts(quality.lobe).astype(np.int32)}
 
 
 def shared_labels(subject: Subject) -> list[tuple[int, int, float]]:

@@ -78,19 +78,21 @@ CONDITIONS = Schema(
 """
 
 ENDS = {
-    "start": Field("i4", ("P1",)),  # where each point's blocked rays begin; the last is a mirror's where `mirror` is not 0
-    "mirror": Field("u1", ("P",)),
+    "start": Field("i4", ("P1",)),  # where each point's blocked rays begin
+    "followed": Field("u1", ("P",)),  # how many of them, the last ones, are followed from mirror to mirror
+    "scale": Field("f2", ("P", "J")),  # of each lobe, what makes all rays' weights those of an open point
     "side": Field("u2", ("R",)),  # side of a cell on which a ray ends
-    "second": Field("u2", ("M",)),  # where a mirror looks on which a mirror's ray ends; and one there
+    "lobe": Field("u1", ("M",)),  # by which glossy lobe a ray that is followed was drawn, 0 a mirror's
+    "second": Field("u2", ("M",)),  # where a mirror looks on which such a ray ends; and one there
     "third": Field("u2", ("M",)),
-    **{f"lobe_{name}": Field("u1", ("Q", 2)) for name in ("towards", "onward")},  # on the octahedral square
-    **{f"mirror_{name}": Field("u2", ("M", 2)) for name in ("towards", "onward", "beyond")},
+    **{f"lobe_{name}": Field("u1", ("Q", 2)) for name in ("towards", "onward")},  # of the others, on the octahedral square
+    **{f"far_{name}": Field("u2", ("M", 2)) for name in ("towards", "onward", "beyond")},
 }
 """Where blocked rays end, see `light.ends`."""
 
 BOUNCES = Schema(
     "dreammat.bounces",
-    3,
+    4,
     {
         **ENDS,  # of all rays of the sides; P1 is S + 1
         "weight": Field("f4", ("R",)),  # share in what a side receives
@@ -106,7 +108,7 @@ BOUNCES = Schema(
 )
 """Light between surfaces, whatever they are made of; see `light.exchange`."""
 
-VIEW_BOUNCES = Schema("dreammat.view_bounces", 2, ENDS)
+VIEW_BOUNCES = Schema("dreammat.view_bounces", 3, ENDS)
 """Where the blocked rays of a view's pixels end."""
 
 SURVEY = Schema(

@@ -1,9 +1,10 @@
 """Where the blocked rays of a view's points end: what of the object each point sees, beside the light that it sees directly.
 
 Rays are those of the transport's lobes and of the mirror. One that is blocked tells the side of a cell (`stages.light.cells`)
-that it ends on, and along which direction a mirror there would look; a mirror's ray also tells what that one would see: the
-open, or another side. That is all that `stages.light.own_light` must know to say what comes along the ray, whatever the object
-is made of: lobes see no gloss sharper than what the side's own rays show.
+that it ends on, and along which direction a mirror there would look; those of narrow lobes and of the mirror are followed:
+they also tell what that one would see, the open or another side, and one there. That is all that `stages.light.own_light` must
+know to say what comes along the ray, whatever the object is made of: wide lobes see no gloss sharper than what the side's own
+rays show.
 
 Directions are kept in two 16-bit numbers on the octahedral square. Normal maps do not turn the mirrors that other points
 show, and what other objects of a scene block stays dark.
@@ -30,18 +31,22 @@ STEPS = 65535
 
 @dataclass(frozen=True)
 class Ends:
-    """Ends of R rays of P points, point after point, a point's mirror ray last: the blocked ones, or all where so asked.
+    """Ends of R rays of P points, point after point: the blocked ones, or all where so asked.
 
-    start: (P + 1,) where a point's rays begin. mirror: (P,) whether its last one is its mirror's. side: (R,) where a ray ends.
-    towards, onward: (R, 2) direction of the ray, and of a mirror where it ends. second, third: (M,) of the M mirrors' rays
-    alone, where a mirror at their end looks, and where one there. beyond: (M, 2) direction of the latter.
+    start: (P + 1,) where a point's rays begin. followed: (P,) how many of them, the last ones, are followed: M in all. scale:
+    (P, J) of the cosine lobe and each glossy one, what makes the weights of all rays those of an open point. side: (R,) where a
+    ray ends. towards, onward: (R, 2) direction of the ray, and of a mirror where it ends. lobe: (M,) by which glossy lobe one
+    that is followed was drawn, from 1, or 0 of the mirror's, its point's last one. second, third: (M,) where a mirror at its
+    end looks, and where one there. beyond: (M, 2) direction of the latter.
     """
 
     start: NDArray[np.int32]
-    mirror: NDArray[np.bool_]
+    followed: NDArray[np.uint8]
+    scale: NDArray[np.float16]
     side: NDArray[np.uint16]
     towards: NDArray[np.uint16]
     onward: NDArray[np.uint16]
+    lobe: NDArray[np.uint8]
     second: NDArray[np.uint16]
     third: NDArray[np.uint16]
     beyond: NDArray[np.uint16]
@@ -52,21 +57,38 @@ class Ends:
         return self.side, self.towards, self.onward
 
     @property
-    def mirrors(self) -> tuple[NDArray[np.uint16], ...]:
-        """What is known of each mirror's ray beside that."""
-        return self.second, self.third, self.beyond
+    def far(self) -> "tuple[NDArray[np.uint8], NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint16]]":
+        """What is known of each ray that is followed beside that."""
+        return self.lobe, self.second, self.third, self.beyond
 
     @property
     def nbytes(self) -> int:
         """Memory of it all."""
-        return sum(array.nbytes for array in (self.start, self.mirror, *self.rays, *self.mirrors))
+        arrays: tuple[NDArray, ...] = (self.start, self.followed, self.scale, *self.rays, *self.far)
+        return sum(array.nbytes for array in arrays)
+
+    @property
+    def mirror(self) -> NDArray[np.bool_]:
+        """Whether each point's last ray is its mirror's, (P,)."""
+        some = np.flatnonzero(self.followed)
+        result = np.zeros(len(self.followed), np.bool_)
+        result[some] = self.lobe[self.far_start[some + 1] - 1] == 0
+        return result
 
     def __getitem__(self, rows: NDArray[np.int64]) -> "Ends":
         """Those of some points; -1 is the last."""
+        rows = rows % len(self.followed)
         start = np.concatenate([[0], np.cumsum(np.diff(self.start)[rows])]).astype(np.int32)
-        ray, shown = self.numbers(rows), self.mirror[rows]
-        last = (np.cumsum(self.mirror) - 1)[rows][shown]
-        return Ends(start, shown, *(a[ray] for a in self.rays), *(a[last] for a in self.mirrors))
+        followed = self.followed[rows]
+        of_rays = tuple(np.empty((start[-1], *a.shape[1:]), a.dtype) for a in self.rays)
+        of_far = tuple(np.empty((followed.sum(dtype=np.int64), *a.shape[1:]), a.dtype) for a in self.far)
+        _take(rows, self.start, self.far_start, (self.rays, self.far), (of_rays, of_far))
+        return Ends(start, followed, self.scale[rows], *of_rays, *of_far)
+
+    @property
+    def far_start(self) -> NDArray[np.int64]:
+        """Where each point's rays begin among those that are followed, (P + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.followed, dtype=np.int64)])
 
     def numbers(self, rows: NDArray[np.int64]) -> NDArray[np.int64]:
         """Which rays are those of some points, in their order."""
@@ -78,62 +100,82 @@ class Ends:
         """Those of the points of all parts."""
         before = np.cumsum([0, *(len(part.side) for part in parts[:-1])])
         start = np.concatenate([[0], *(part.start[1:] + n for part, n in zip(parts, before, strict=True))])
-        rays = (np.concatenate(arrays) for arrays in zip(*((*part.rays, *part.mirrors) for part in parts), strict=True))
-        return Ends(start.astype(np.int32), np.concatenate([part.mirror for part in parts]), *rays)
+        rest = ((part.followed, part.scale, *part.rays, *part.far) for part in parts)
+        return Ends(start.astype(np.int32), *(np.concatenate(arrays) for arrays in zip(*rest, strict=True)))
 
     def to_arrays(self) -> dict[str, NDArray]:
-        """As `core.schemas.ENDS` has them: directions of lobes, which see nothing sharp, in 8 bits, those of mirrors in 16."""
-        last = _last(self.start, self.mirror)
-        arrays: dict[str, NDArray] = {"start": self.start, "mirror": self.mirror.astype(np.uint8)}
-        arrays |= {"side": self.side, "second": self.second, "third": self.third, "mirror_beyond": self.beyond}
+        """As `core.schemas.ENDS` has them: directions of wide lobes, which see nothing sharp, in 8 bits, the others in 16."""
+        far = _far(self.start, self.followed)
+        arrays: dict[str, NDArray] = {"start": self.start, "followed": self.followed, "scale": self.scale}
+        arrays |= {"side": self.side, "lobe": self.lobe, "second": self.second, "third": self.third, "far_beyond": self.beyond}
         for name in ("towards", "onward"):
             steps = getattr(self, name)
-            arrays[f"lobe_{name}"] = np.rint(steps[~last] / (STEPS / 255)).astype(np.uint8)
-            arrays[f"mirror_{name}"] = steps[last]
+            arrays[f"lobe_{name}"] = np.rint(steps[~far] / (STEPS / 255)).astype(np.uint8)
+            arrays[f"far_{name}"] = steps[far]
         return arrays
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, NDArray]) -> "Ends":
         """The inverse of `to_arrays`."""
-        start, mirror = arrays["start"], arrays["mirror"] != 0
-        last = _last(start, mirror)
-        directions = []
+        start, followed = arrays["start"], arrays["followed"]
+        far = _far(start, followed)
+        directions: list[NDArray] = []
         for name in ("towards", "onward"):
-            steps = np.empty((len(last), 2), np.uint16)
-            steps[~last] = arrays[f"lobe_{name}"].astype(np.uint16) * np.uint16(STEPS // 255)
-            steps[last] = arrays[f"mirror_{name}"]
+            steps = np.empty((len(far), 2), np.uint16)
+            steps[~far] = arrays[f"lobe_{name}"].astype(np.uint16) * np.uint16(STEPS // 255)
+            steps[far] = arrays[f"far_{name}"]
             directions.append(steps)
-        far = (arrays[name] for name in ("second", "third", "mirror_beyond"))
-        return Ends(start, mirror, arrays["side"], *directions, *far)
+        rest = (arrays[name] for name in ("lobe", "second", "third", "far_beyond"))
+        return Ends(start, followed, arrays["scale"], arrays["side"], *directions, *rest)
 
     @staticmethod
-    def none(points: int) -> "Ends":
-        """Of points that see nothing of the object."""
+    def none(points: int, lobes: int = 0) -> "Ends":
+        """Of points that see nothing of the object. Args: lobes: J."""
         short, pair = np.zeros(0, np.uint16), np.zeros((0, 2), np.uint16)
-        return Ends(np.zeros(points + 1, np.int32), np.zeros(points, np.bool_), short, pair, pair, short, short, pair)
+        each = np.zeros(points + 1, np.int32), np.zeros(points, np.uint8), np.zeros((points, lobes), np.float16)
+        return Ends(*each, short, pair, pair, short.astype(np.uint8), short, short, pair)
 
 
-def _last(start: NDArray[np.int32], mirror: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which rays are mirrors' (R,)."""
-    last = np.zeros(start[-1], np.bool_)
-    last[start[1:][mirror] - 1] = True
-    return last
+@compiled
+def _take(rows, start, far_start, arrays, out):  # type: ignore[no-untyped-def]
+    """The rays of some points, and those that are followed, written to `out` after each other."""
+    side, towards, onward = arrays[0]
+    lobe, second, third, beyond = arrays[1]
+    new_side, new_towards, new_onward = out[0]
+    new_lobe, new_second, new_third, new_beyond = out[1]
+    k, m = 0, 0
+    for row in rows:
+        for i in range(start[row], start[row + 1]):
+            new_side[k] = side[i]
+            new_towards[k, 0], new_towards[k, 1] = towards[i, 0], towards[i, 1]
+            new_onward[k, 0], new_onward[k, 1] = onward[i, 0], onward[i, 1]
+            k += 1
+        for i in range(far_start[row], far_start[row + 1]):
+            new_lobe[m], new_second[m], new_third[m] = lobe[i], second[i], third[i]
+            new_beyond[m, 0], new_beyond[m, 1] = beyond[i, 0], beyond[i, 1]
+            m += 1
+
+
+def _far(start: NDArray[np.int32], followed: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """Which rays are followed (R,)."""
+    back = start[1:].repeat(np.diff(start)) - np.arange(start[-1])  # 1 at a point's last one
+    return back <= followed.repeat(np.diff(start))
 
 
 def find_ends(
-    scene: Scene, cells: Cells, points: int, found: tuple[NDArray, NDArray, NDArray], origin: NDArray, direction: NDArray
+    scene: Scene, cells: Cells, scale: NDArray, found: tuple[NDArray, NDArray, NDArray], origin: NDArray, direction: NDArray
 ) -> Ends:
     """Follow some rays, ordered by their points.
 
     Args:
-        points: how many there are. found: (R,) each, the number of a ray's point, ascending; whether it is its point's mirror
-        ray, the last one then; whether anything blocks it. origin, direction: (R, 3).
+        scale: (P, J), of `Ends`. found: (R,) each, the number of a ray's point, ascending; its lobe if it is followed further,
+        see `Ends`, such rays last among their point's, or -1; whether anything blocks it. origin, direction: (R, 3).
     """
-    point, mirror, blocked = found
+    (point, lobe, blocked), points = found, len(scale)
     hit = np.flatnonzero(blocked)
     side, first = np.full(len(point), OPEN, np.uint16), np.zeros((len(point), 3), np.float32)
     side[hit], start, first[hit] = _mirrored(scene, cells, origin[hit], direction[hit])
-    far = np.flatnonzero(mirror)
+    far = np.flatnonzero(lobe >= 0)
     second, third = np.full((2, len(far)), OPEN, np.uint16)
     beyond = np.zeros((len(far), 3), np.float32)
     own = np.flatnonzero(side[far] < DARK)
@@ -141,11 +183,11 @@ def find_ends(
     second[own], begin, beyond[own] = _mirrored(scene, cells, begin, first[far[own]])
     again = second[own] < DARK
     third[own[again]] = _mirrored(scene, cells, begin[again], beyond[own[again]])[0]
-    shown = np.zeros(points, np.bool_)
-    shown[point[mirror]] = True
+    followed = np.bincount(point[far], minlength=points).astype(np.uint8)
     begins = np.concatenate([[0], np.cumsum(np.bincount(point, minlength=points))]).astype(np.int32)
     towards, onward, last = (on_steps(np.ascontiguousarray(d, np.float32)) for d in (direction, first, beyond))
-    return Ends(begins, shown, side, towards, onward, second, third, last)
+    each = (begins, followed, scale.astype(np.float16))
+    return Ends(*each, side, towards, onward, lobe[far].astype(np.uint8), second, third, last)
 
 
 def _mirrored(

@@ -68,7 +68,7 @@ class Exchange:
         own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, *rays, seen)
         reflected = np.tile(reflectance(material), direct.shape[1] // 3)
         for _ in range(bounces - 1):
-            more, brought = received(self.ends, self.weight, own)
+            more, brought = received(self.ends, self.weight, own, self.sky)
             light, before, sent = direct + more, own.light, reflected * own.before
             seen = np.ascontiguousarray((shown + brought).T)
             own = OwnLight(own.bounces + 1, own.material, light, before, sent, *rays, seen)
@@ -113,7 +113,7 @@ def make_exchange(scene: Scene, cells: Cells, environments: list[Environment], s
     new = np.flatnonzero(opened)
     while len(new):
         light[new], found, weight, angle = _traced(scene, points[new], cells, environments, seed)
-        place[new] = len(ends.mirror) + np.arange(len(new))
+        place[new] = len(ends.followed) + np.arange(len(new))
         opened[new] |= np.add.reduceat(np.append(found.side == OPEN, 0), found.start[:-1]) >= OPENINGS
         ends = Ends.cat([ends, found])
         weights.append(weight)

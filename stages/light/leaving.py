@@ -37,6 +37,9 @@ SOFT = 0.36
 NARROW, WIDE = 0.2, 0.35
 """Roughness up to which gloss of a side shows what its mirror's ray meets, and from which on what the side's own rays meet."""
 
+ALIKE = math.cos(math.radians(6))
+"""Cosine between two rays of a point that end on one side from which on rough gloss sends alike along both."""
+
 POINTS_PER_TASK = 1 << 11
 
 RAYS_PER_TASK = 1 << 16
@@ -97,36 +100,33 @@ def _levels(environment: Environment) -> list[NDArray[np.float32]]:
     return [octahedral(image, size, 2) for image, size in zip(images, SIZES, strict=True)]
 
 
-def arriving(ends: Ends, own: OwnLight, part: slice) -> NDArray[np.float32]:
-    """What the blocked rays of some points bring them: (rays, 3 L)."""
-    result = np.empty((ends.start[part.stop] - ends.start[part.start], own.light.shape[1]), np.float32)
-    start = ends.start[part.start : part.stop + 1]
-    _arriving(start, ends.rays, own, (albedo.table(), albedo.diffuse_table()), result)
-    return result
+def arriving(ends: Ends, own: OwnLight, sky: Sky, part: slice, blur: NDArray[np.float32]) -> NDArray[np.float32]:
+    """What the blocked rays of some points bring them: (rays, 3 L).
 
-
-def mirrored(ends: Ends, own: OwnLight, sky: Sky, part: slice, least: NDArray[np.float32]) -> NDArray[np.float32]:
-    """What the mirror rays of some points bring them, seen by lobes of several roughnesses: (points, M, 3 L), 0 without one.
-
-    Args: least: (points, M), roughness of each lobe.
+    Args: blur: (points, J), roughness of what a ray that is followed stands for, by its `Ends.lobe`.
     """
-    result = np.zeros((*least.shape, own.light.shape[1]), np.float32)
-    start = ends.start[part.start : part.stop + 1]
-    first = np.count_nonzero(ends.mirror[: part.start])
-    rays = (*ends.rays, *ends.mirrors)
-    _mirrored(start, ends.mirror[part], rays, first, least, own, sky, (albedo.table(), albedo.diffuse_table()), result)
+    result = np.empty((ends.start[part.stop] - ends.start[part.start], own.light.shape[1]), np.float32)
+    start, followed = ends.start[part.start : part.stop + 1], ends.followed[part]
+    tables = albedo.table(), albedo.diffuse_table()
+    _arriving(start, followed, ends.rays, own, tables, result)
+    if followed.any():
+        first = int(ends.followed[: part.start].sum(dtype=np.int64))
+        _followed(start, followed, (*ends.rays, *ends.far), first, blur, own, sky, tables, result)
     return result
 
 
-def received(ends: Ends, weight: NDArray[np.float32], own: OwnLight) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def received(
+    ends: Ends, weight: NDArray[np.float32], own: OwnLight, sky: Sky
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """What all rays of each of the points bring it, each of a weight: (P, 3 L), and what each ray brings, (R, 3 L)."""
-    points = len(ends.mirror)
+    points = len(ends.followed)
+    none = np.zeros((points, 1), np.float32)
     result = np.zeros((points, own.light.shape[1]), np.float32)
     brought = np.empty((len(weight), own.light.shape[1]), np.float32)
 
     def task(part: slice) -> None:
         rays = slice(ends.start[part.start], ends.start[part.stop])
-        brought[rays] = arriving(ends, own, part)
+        brought[rays] = arriving(ends, own, sky, part, none[part])
         _weighted(ends.start[part.start : part.stop + 1], weight, brought[rays], result[part])
 
     in_parallel(task, slices(points, POINTS_PER_TASK))
@@ -258,19 +258,18 @@ def _rougher(roughness, other):  # type: ignore[no-untyped-def]
 
 @fast
 def _lobe(around, first, last, d, n, a2, weight):  # type: ignore[no-untyped-def]
-    """Weights of a side's rays, `first` to `last`, in its gloss towards -d, written to `weight`."""
+    """Weights of a side's rays, `first` to `last`, in its gloss towards -d, written to `weight`: D and G times their angle."""
     f32 = np.float32
     n_o = max(-(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]), f32(MIN_COSINE))
-    masking = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) / (n_o * n_o) - f32(1)))
+    masking, rest = math.sqrt(f32(1) + a2 * (f32(1) / (n_o * n_o) - f32(1))), f32(1) - a2
     x, y, z, angle = around[0, first:last], around[1, first:last], around[2, first:last], around[3, first:last]
     for i in range(last - first):
         cosine = n[0] * x[i] + n[1] * y[i] + n[2] * z[i]
         n_i = max(cosine, f32(MIN_COSINE))
-        square = f32(2) - f32(2) * (d[0] * x[i] + d[1] * y[i] + d[2] * z[i])  # of the half vector's length
-        cos2 = min((n_i + n_o) * (n_i + n_o) / max(square, f32(1e-6)), f32(1))
-        q = f32(1) - cos2 + a2 * cos2
-        shadowing = f32(0.5) * math.sqrt(f32(1) + a2 * (f32(1) / (n_i * n_i) - f32(1)))
-        weight[i] = angle[i] / (q * q * (masking + shadowing)) if cosine > f32(MIN_COSINE) else f32(0)
+        square = max(f32(2) - f32(2) * (d[0] * x[i] + d[1] * y[i] + d[2] * z[i]), f32(1e-6))  # of the half vector's length
+        q = max(square - rest * (n_i + n_o) * (n_i + n_o), a2 * square) / square
+        q2 = q * q * (masking * n_i + math.sqrt(a2 + rest * n_i * n_i))
+        weight[i] = angle[i] * n_i / q2 if cosine > f32(MIN_COSINE) else f32(0)
 
 
 @compiled
@@ -306,56 +305,33 @@ def _mean(weight, brought, first, last, out):  # type: ignore[no-untyped-def]
 
 
 @compiled(inline="always")
-def _mirror_there(ray, number, rays, towards, rough, own, sky, tables, shown):  # type: ignore[no-untyped-def]
+def _mirror_there(ray, number, rays, towards, rough, cells, sky, tables, shown):  # type: ignore[no-untyped-def]
     """What a smooth side shows at the end of a ray: the sky along its mirror, or another side, of which the same is asked.
 
-    Args: towards: direction of that mirror.
+    Args: towards: direction of that mirror. cells: bounces, material, before and sent of `OwnLight`.
     """
-    _, _, onward, second, third, beyond = rays
+    onward, second, third, beyond = rays
+    bounces, material, before, sent = cells
     if second[number] == OPEN:
         _look_up(sky, onward[ray], rough, shown)
-    elif second[number] == DARK or own.bounces < 2:
+    elif second[number] == DARK or bounces < 2:
         _clear(shown)
     else:
         there = second[number]
         if third[number] == OPEN:
-            _look_up(sky, beyond[number], _rougher(rough, own.material[there, 3]), shown)
+            _look_up(sky, beyond[number], _rougher(rough, material[there, 3]), shown)
         elif third[number] == DARK:
             _clear(shown)
         else:
             for c in range(len(shown)):
-                shown[c] = own.sent[third[number], c]
+                shown[c] = sent[third[number], c]
         cosine = _cosine(towards, _direction(beyond[number]))
-        _send(own.material, own.before, there, cosine, tables[0], tables[1], shown)
+        _send(material, before, there, cosine, tables[0], tables[1], shown)
 
 
 @compiled
-def _along(ray, number, rays, lobe, own, sky, tables, weight, seen, shown):  # type: ignore[no-untyped-def]
-    """What comes along a mirror's ray, seen by a lobe of a roughness, written to `shown`. Args: number: among those."""
-    f32 = np.float32
-    side = rays[0][ray]
-    if side >= DARK:
-        _clear(shown)
-        return
-    towards, onward = _direction(rays[1][ray]), _direction(rays[2][ray])
-    rough = _rougher(own.material[side, 3], lobe)
-    wide = min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
-    first, last = own.start[side], own.start[side + 1]
-    if wide > f32(0) and not _around(first, last, towards, onward, rough, own.around, own.brought, weight, seen):
-        wide = f32(0)
-    if wide < f32(1):
-        _mirror_there(ray, number, rays, onward, rough, own, sky, tables, shown)
-        for c in range(len(shown)):
-            shown[c] += wide * (seen[c] - shown[c])
-    else:
-        for c in range(len(shown)):
-            shown[c] = seen[c]
-    _send(own.material, own.light, side, _cosine(towards, onward), tables[0], tables[1], shown)
-
-
-@compiled
-def _arriving(start, rays, own, tables, out):  # type: ignore[no-untyped-def]
-    """`arriving`; start begins at the first of the rays that are wanted.
+def _arriving(start, followed, rays, own, tables, out):  # type: ignore[no-untyped-def]
+    """`arriving`, of rays that are not followed; start begins at the first of the rays that are wanted.
 
     What is in a tuple is taken out before the loop: within it, each time costs as much as the sums.
     """
@@ -363,32 +339,56 @@ def _arriving(start, rays, own, tables, out):  # type: ignore[no-untyped-def]
     table, diffuse = tables
     begin, around, material, light, brought = own.start, own.around, own.material, own.light, own.brought
     weight, shown = np.empty(MOST, np.float32), np.zeros(out.shape[1], np.float32)
-    for i in range(len(out)):
-        ray = start[0] + i
-        side = side_of[ray]
-        _clear(shown)
-        if side < DARK:
-            d = on_square(towards[ray, 0] * np.float32(1 / STEPS), towards[ray, 1] * np.float32(1 / STEPS))
-            m = on_square(onward[ray, 0] * np.float32(1 / STEPS), onward[ray, 1] * np.float32(1 / STEPS))
-            rough = max(material[side, 3], np.float32(SOFT))
-            _around(begin[side], begin[side + 1], d, m, rough, around, brought, weight, shown)
-            _send(material, light, side, _cosine(d, m), table, diffuse, shown)
-        for c in range(len(shown)):
-            out[i, c] = shown[c]
+    for p in range(len(followed)):
+        for ray in range(start[p], start[p + 1] - followed[p]):
+            side = side_of[ray]
+            _clear(shown)
+            if side < DARK:
+                d = on_square(towards[ray, 0] * np.float32(1 / STEPS), towards[ray, 1] * np.float32(1 / STEPS))
+                m = on_square(onward[ray, 0] * np.float32(1 / STEPS), onward[ray, 1] * np.float32(1 / STEPS))
+                rough = max(material[side, 3], np.float32(SOFT))
+                _around(begin[side], begin[side + 1], d, m, rough, around, brought, weight, shown)
+                _send(material, light, side, _cosine(d, m), table, diffuse, shown)
+            for c in range(len(shown)):
+                out[ray - start[0], c] = shown[c]
 
 
 @compiled
-def _mirrored(start, mirror, rays, first, least, own, sky, tables, out):  # type: ignore[no-untyped-def]
-    """`mirrored`; start begins at the first of the points that are wanted, and first is the number of its mirror's ray."""
-    channels, number = out.shape[2], first
-    weight, seen, shown = np.empty(MOST, np.float32), np.zeros(channels, np.float32), np.zeros(channels, np.float32)
-    for p in range(len(mirror)):
-        if mirror[p]:
-            for k in range(least.shape[1]):
-                ray, lobe = start[p + 1] - 1, least[p, k]
-                _along(ray, number, rays, lobe, own, sky, tables, weight, seen, shown)
+def _followed(start, followed, rays, first, blur, own, sky, tables, out):  # type: ignore[no-untyped-def]
+    """`arriving`, of rays that are followed; start begins at the first of the points that are wanted.
+
+    A side whose gloss is rough for what the ray stands for shows what its own rays bring, a smooth one what mirrors show.
+    Args: first: number of the first one's first ray among those that are followed.
+    """
+    f32 = np.float32
+    side_of, towards, onward, lobe, second, third, beyond = rays
+    material, light, begin, around, brought = own.material, own.light, own.start, own.around, own.brought
+    far, cells = (onward, second, third, beyond), (own.bounces, own.material, own.before, own.sent)
+    channels, number, (table, diffuse) = out.shape[1], first, tables
+    weight, seen, shown = np.empty(MOST, f32), np.zeros(channels, f32), np.zeros(channels, f32)
+    for p in range(len(followed)):
+        last, d = np.uint16(DARK), (f32(0), f32(0), f32(0))
+        for ray in range(start[p + 1] - followed[p], start[p + 1]):
+            side, along = side_of[ray], _direction(towards[ray])
+            alike = side == last and d[0] * along[0] + d[1] * along[1] + d[2] * along[2] > f32(ALIKE)
+            if side >= DARK:
+                _clear(shown)
+                last = side
+            elif not alike or material[side, 3] < f32(WIDE):
+                mirror = _direction(onward[ray])
+                rough = _rougher(material[side, 3], blur[p, lobe[number]])
+                wide = min(max((rough - f32(NARROW)) * f32(1 / (WIDE - NARROW)), f32(0)), f32(1))
+                to = begin[side + 1]
+                if wide > f32(0) and not _around(begin[side], to, along, mirror, rough, around, brought, weight, seen):
+                    wide = f32(0)
+                if wide < f32(1):
+                    _mirror_there(ray, number, far, mirror, rough, cells, sky, tables, shown)
                 for c in range(channels):
-                    out[p, k, c] = shown[c]
+                    shown[c] = shown[c] + wide * (seen[c] - shown[c]) if wide < f32(1) else seen[c]
+                _send(material, light, side, _cosine(along, mirror), table, diffuse, shown)
+                last, d = side, along
+            for c in range(channels):
+                out[ray - start[0], c] = shown[c]
             number += 1
 
 

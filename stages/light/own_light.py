@@ -2,8 +2,8 @@
 
 What a point receives from the object is linear in what its other points send out. Where its blocked rays end is known
 (`stages.light.ends`), and what the sides of cells send along them (`stages.light.leaving`), once the light between them is
-(`stages.light.exchange`). E, A and B of the point grow by what its rays bring, weighted as the transport weighs them; a lobe
-narrower than its few rays takes what the mirror shows. So the point's own albedo, metallic and roughness enter exactly.
+(`stages.light.exchange`). E, A and B of the point grow by what its rays bring, weighted as the transport weighs them. So the
+point's own albedo, metallic and roughness enter exactly.
 """
 
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,20 +14,16 @@ from numpy.typing import NDArray
 from stages.core.frames import tangent_frame
 from stages.core.knots import KNOTS
 from stages.core.lanes import LANES
-from stages.core.parallel import compiled, in_parallel, slices
+from stages.core.parallel import in_parallel, slices
 from stages.light import reconstruction
 from stages.light.cells import Cells
 from stages.light.ends import STEPS, Ends
-from stages.light.leaving import POINTS_PER_TASK, OwnLight, Sky, arriving, mirrored
+from stages.light.leaving import POINTS_PER_TASK, OwnLight, Sky, arriving
 from stages.light.terms import GLTF, Terms
-from stages.light.transport_kernels import in_lanes, on_square, weigh
+from stages.light.transport_kernels import fast, in_lanes, on_square, weigh
 
 if TYPE_CHECKING:
     from stages.core.shading import Transport
-
-NARROW, WIDE = 0.2, 0.3
-"""Roughness up to which a lobe takes what the mirror shows, and from which on what its rays bring."""
-
 
 AVERAGED = (0, *(k for k in GLTF.joint if k <= len(KNOTS)))
 """Sums over whose neighbours noise is averaged: E and A of wide lobes. Narrower ones show edges, and B brings little."""
@@ -61,18 +57,18 @@ def own_sums(
     cosine = (n * wo).sum(-1).astype(np.float64).clip(0, 1)
     where = np.array(terms.summed), np.array(terms.mirror)
     mirrors = np.stack(terms.mirror_weights(cosine), 1).astype(np.float32)
-
-    narrow = int((terms.alphas(np.arange(points)) < WIDE**2).any(0).sum())
+    mirror = ends.mirror
 
     def task(part: slice) -> None:
         rows = np.arange(part.start, part.stop)
         some = tuple(np.ascontiguousarray(a[part]) for a in (*frame, wo))
-        opened = np.ascontiguousarray(terms.open_albedo(cosine[part], rows), np.float32)
         alphas = terms.alphas(rows)
-        least = np.concatenate([np.zeros((len(rows), 1), np.float32), np.sqrt(alphas)], 1)[:, : 1 + narrow]
-        rays = (ends.start[part.start : part.stop + 1], ends.mirror[part], ends.towards, arriving(ends, own, part))
-        shown = (alphas, opened, mirrors[part], mirrored(ends, own, sky, part, least))
-        _gather(*some, rays, shown, counts, where, result[part], variance[part])
+        blur = np.zeros((len(rows), len(counts)), np.float32)  # of so many rays, each stands for that share of its lobe
+        blur[:, 1:] = np.sqrt(alphas / np.sqrt(counts[1:]))
+        brings = arriving(ends, own, sky, part, blur)
+        rays = (ends.start[part.start : part.stop + 1], mirror[part], ends.towards, brings)
+        scales = (mirrors[part], ends.scale[part].astype(np.float32))
+        _gather(*some, rays, alphas, scales, counts, where, result[part], variance[part])
 
     in_parallel(task, slices(points, POINTS_PER_TASK))
     return result, variance
@@ -107,22 +103,24 @@ def with_own_light(
     return Transport(transport.E + E[:, 0], transport.A + A, transport.B + B, transport.cosine)
 
 
-@compiled
-def _gather(n, t, b, wo, rays, shown, counts, where, out, noise):  # type: ignore[no-untyped-def]
-    """`own_sums` of some points. rays: start, mirror and towards of `Ends`, what they bring. shown: alphas (P, K), open
-    albedo (P, 1 + 2 K), weights of the mirror, and what it shows to itself and to narrow lobes."""
+@fast
+def _gather(n, t, b, wo, rays, alphas, scales, counts, where, out, noise):  # type: ignore[no-untyped-def]
+    """`own_sums` of some points. rays: start of `Ends`, whether the last one is a mirror's, towards, what they bring. alphas:
+    (P, K). scales: weights of the mirror, and of `Ends`.
+    """
     f32 = np.float32
     start, mirror, towards, radiance = rays
-    alphas, opened, mirrors, reflected = shown
+    mirrors, scale = scales
     summed, mirrored = where
     points, knots = alphas.shape
-    channels, terms, lobe_rays = out.shape[2], opened.shape[1], f32(counts.sum())
+    channels, terms, lobe_rays = out.shape[2], 1 + 2 * knots, f32(counts.sum())
     most = 1
     for p in range(points):
         most = max(most, start[p + 1] - start[p])
     most = in_lanes(most)
     dx, dy, dz, scratch = np.empty(most, f32), np.empty(most, f32), np.empty(most, f32), np.empty((6, LANES), f32)
     density, inverse, weight = np.empty(most, f32), np.empty(most, f32), np.empty(terms * most, f32)
+    seen = np.empty((channels, most), f32)
     step = f32(1 / STEPS)
     for p in range(points):
         first, count = start[p], start[p + 1] - start[p]
@@ -133,31 +131,22 @@ def _gather(n, t, b, wo, rays, shown, counts, where, out, noise):  # type: ignor
         if lobes:
             filled = in_lanes(lobes)
             dx[lobes:filled], dy[lobes:filled], dz[lobes:filled] = n[p, 0], n[p, 1], n[p, 2]
+            for c in range(channels):
+                for i in range(filled):
+                    seen[c, i] = brings[i, c] if i < lobes else f32(0)
             w = weight[: terms * filled].reshape((terms, filled))
             weigh(n, t, b, wo, p, (dx, dy, dz), filled, alphas, counts, (False, 0.0, 0.0), scratch, density, inverse, w)
             for j in range(terms):
-                wide = f32(1) if j == 0 else _wideness(alphas[p, (j - 1) % knots])
-                if wide <= 0:
-                    continue
+                whole = scale[p, 1 + (j - 1) % knots if j > 0 else 0]
                 for c in range(channels):
                     total, squares = f32(0), f32(0)
-                    for i in range(lobes):
-                        brought = w[j, i] * brings[i, c]
+                    for i in range(filled):
+                        brought = w[j, i] * seen[c, i]
                         total += brought
                         squares += brought * brought
-                    out[p, summed[j], c] = wide * total
-                    noise[p, summed[j], c] = max(squares - total * total / lobe_rays, f32(0)) * wide * wide
+                    out[p, summed[j], c] = whole * total
+                    noise[p, summed[j], c] = max(squares - total * total / lobe_rays, f32(0)) * whole * whole
         if mirror[p]:
             for c in range(channels):
                 for j in range(2):
-                    out[p, mirrored[j], c] = mirrors[p, j] * reflected[p, 0, c]
-                for j in range(1, terms):
-                    narrow = f32(1) - _wideness(alphas[p, (j - 1) % knots])
-                    if narrow > 0:
-                        out[p, summed[j], c] += narrow * opened[p, j] * reflected[p, 1 + (j - 1) % knots, c]
-
-
-@compiled(inline="always")
-def _wideness(alpha):  # type: ignore[no-untyped-def]
-    """How far a lobe goes by its own rays, 0 to 1."""
-    return min(max((np.sqrt(alpha) - np.float32(NARROW)) * np.float32(1 / (WIDE - NARROW)), np.float32(0)), np.float32(1))
+                    out[p, mirrored[j], c] = mirrors[p, j] * brings[lobes, c]

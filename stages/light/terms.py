@@ -5,7 +5,7 @@ released ControlNet was shown: the six light maps of `stages.light.blender`.
 """
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,9 @@ from stages.core.albedo import COSINE_STEPS, cosines, diffuse_table, open_albedo
 from stages.core.brdf import alpha_from_roughness
 from stages.core.knots import KNOTS, LIGHT_MAPS
 from stages.light import blender
+
+NARROW = 0.3
+"""Roughness of a lobe under which its rays are followed from mirror to mirror."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +104,9 @@ GLTF = Terms(
     highlights=tuple(range(KNOTS.index(0.25) - 1, KNOTS.index(0.65))),
 )
 """E, A at every knot, B at every knot."""
+
+BOUNCED = replace(GLTF, shares=(0.16, 0.32, 0.16, 0.11, 0.11, 0.16, 0.16, 0.16, 0.1))
+"""The same where the object is seen in itself too: more rays of narrow lobes, which are followed from mirror to mirror."""
 
 BLENDER = Terms(
     roughness=(0.5, 1.0),

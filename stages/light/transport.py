@@ -49,10 +49,11 @@ from stages.light.environment import Environment
 from stages.light.gbuffer import GBuffer
 from stages.light.light_set import CHANNELS, MAX_LIGHTS, LightSet, light_set
 from stages.light.scene import Scene
-from stages.light.terms import GLTF, Terms
+from stages.light.terms import BOUNCED, GLTF, NARROW, Terms
 from stages.light.transport_kernels import (
     CLASSES,
     GOLDEN,
+    WEIGHT,
     accumulate,
     aim,
     draw,
@@ -90,6 +91,11 @@ class Quality:
         """About `factor` times as many rays."""
         return replace(self, lobe=max(2, round(self.lobe * factor)), light=max(2, round(self.light * factor)))
 
+    @property
+    def bounced(self) -> "Quality":
+        """Where the object is seen in itself too, which takes what its points receive directly for exact."""
+        return replace(self, light=round(self.light * MORE_LIGHT))
+
 
 @dataclass(frozen=True)
 class Round:
@@ -112,6 +118,9 @@ SEED_STEP = 0x5EED
 
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
+
+MORE_LIGHT = 1.5
+"""Light rays of a point with bounces, as a multiple of those without."""
 
 QUALITY = {"draft": Quality(19, 9), "standard": Quality(38, 18), "high": Quality(304, 144)}
 
@@ -159,7 +168,7 @@ def transport_and_ends(
     ends = None
     for first in range(0, len(environments), MAX_LIGHTS):
         lights = cached_light_set(tuple(environments[first : first + MAX_LIGHTS]))
-        some, found = integrate_with_ends(scene, points, lights, quality, seed, None if first else cells)
+        some, found = _integrated(scene, points, lights, *rays_for(quality, cells), seed, None if first else cells)
         result += some
         ends = ends or found
     return result, ends
@@ -184,8 +193,19 @@ def integrate_with_ends(
     scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, seed: int, cells: Cells | None = None
 ) -> "tuple[list[Transport], Ends | None]":
     """`integrate`, and where the points' blocked rays end, if the surface is given in cells."""
+    return _integrated(scene, points, lights, *rays_for(quality, cells), seed, cells)
+
+
+def rays_for(quality: Quality, cells: Cells | None) -> tuple[Quality, Terms]:
+    """What a view is traced with: more where the object is seen in itself, in cells, too."""
+    return (quality, GLTF) if cells is None else (quality.bounced, BOUNCED)
+
+
+def _integrated(
+    scene: Scene, points: GBuffer, lights: LightSet, quality: Quality, terms: Terms, seed: int, cells: Cells | None
+) -> "tuple[list[Transport], Ends | None]":
     near = reconstruction.Neighbours.of(points)
-    sums = gather(scene, points, lights, quality, seed, near, cells=cells).of_lights(len(lights.environments))
+    sums = gather(scene, points, lights, quality, seed, near, terms, cells).of_lights(len(lights.environments))
     mean = smoothed(sums, points, lights, near) if quality.smooth else sums.mean
     import torch  # here, for who only asks for what a known material reflects has no tensors
 
@@ -295,7 +315,7 @@ def trace(
     if not wanted.all():
         gap[..., : 3 * count[1]] *= wanted.repeat(3, 1)[:, None]  # nor is its noise any to judge others by
     variance = reconstruction.variance(gap, reconstruction.Neighbours.of(points))
-    ends = None if cells is None else Ends.cat([Ends.none(0), *filter(None, found)])[np.argsort(order)]
+    ends = None if cells is None else Ends.cat([Ends.none(0, lobes_told(rays, every)), *filter(None, found)])[np.argsort(order)]
     return Sums(mean, variance, np.ones(count, np.float32), ends)
 
 
@@ -330,18 +350,39 @@ def _tile(
     for e, environment in enumerate(lights.environments):
         mirror(environment.radiance, drawn, occluded, weights, (part, terms.mirror), 3 * e, mean)
     among, every = asked
-    return None if among is None else _ends(scene, among, rays, drawn, occluded, every)
+    scale = mean[part[:, None], terms.summed[: lobes_told(rays, every)], WEIGHT]
+    mean[part, :, WEIGHT] = 0
+    return None if among is None else _ends(scene, among, rays, drawn, occluded, (alphas, scale, every))
 
 
-def _ends(scene: Scene, cells: Cells, rays: "Rays", drawn: "Drawn", occluded: NDArray[np.bool_], every: bool) -> Ends:
-    """Where the blocked rays of a tile's lobes and mirrors end, or every one of its lobes."""
-    slots = np.flatnonzero(rays.slots[:, 0] < len(rays.counts))  # the mirror's is the last one
-    mirror = len(slots) - 1
-    ray = drawn.row[:, slots[:mirror] if every else slots]
+def lobes_told(rays: "Rays", every: bool) -> int:
+    """Of how many lobes `Ends.scale` tells: of none where all rays are told of."""
+    return 0 if every else len(rays.counts)
+
+
+def _ends(
+    scene: Scene,
+    cells: Cells,
+    rays: "Rays",
+    drawn: "Drawn",
+    occluded: NDArray[np.bool_],
+    lobes: tuple[NDArray[np.float32], NDArray[np.float32], bool],
+) -> Ends:
+    """Where the blocked rays of a tile's lobes and mirrors end.
+
+    Args: lobes: alphas, `Ends.scale`, and whether it is asked of every ray of the lobes, and of no mirror's.
+    """
+    alphas, scale, every = lobes
+    ends = np.full((len(alphas), 1), np.inf), np.zeros((len(alphas), 1))
+    alphas = np.concatenate([ends[0], alphas, ends[1]], 1)  # the cosine lobe's, number 0, and the mirror's, number -1
+    slots = np.flatnonzero(rays.slots[: len(rays.slots) - every, 0] < len(rays.counts))
+    slots = slots[np.argsort(-alphas[0, rays.slots[slots, 0]], kind="stable")]
+    ray, lobe = drawn.row[:, slots], rays.slots[slots, 0]
     point, slot = np.nonzero((ray >= 0) & (occluded[ray] | every))
-    ray = ray[point, slot]
-    found = (point, slot == mirror, occluded[ray])
-    return find_ends(scene, cells, len(drawn.row), found, drawn.origin[ray], drawn.direction[ray])
+    ray, lobe = ray[point, slot], lobe[slot]
+    narrow = alphas[point, lobe] < alpha_from_roughness(NARROW)
+    found = (point, np.where(narrow, lobe.clip(0), -1), occluded[ray])
+    return find_ends(scene, cells, scale, found, drawn.origin[ray], drawn.direction[ray])
 
 
 def blocked(scene: Scene, points: GBuffer, part: NDArray, drawn: "Drawn") -> NDArray[np.bool_]:

@@ -478,8 +478,8 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, albedo, seen, where
         plain, see `_scales`, and the light is looked up as it is.
         seen: pyramid, level_start, fine, block, peak of a `LightSet`; density of `Rays`; number of `Cells`; aimed of `aim`.
         where: each point's row of `out` and `gap`, and the place of each sum in it.
-        out: (..., CHANNELS), written. gap: as `out`, written: the estimate from the first half of the rays less that
-        from the second.
+        out: (..., CHANNELS), written, the scale of `_scales` in channel WEIGHT. gap: as `out`, written: the estimate from the
+        first half of the rays less that from the second.
     """
     f32 = np.float32
     counts, bounds, slots, principled = sampled
@@ -561,7 +561,7 @@ def accumulate(n, t, b, wo, alphas, sampled, rays, occluded, albedo, seen, where
             bright0, bright1 = load(total, (2 * terms + j) * CHANNELS), load(total, (3 * terms + j) * CHANNELS)
             store(out, place, (smooth0 + smooth1) * scale + (bright0 + bright1))
             store(gap, place, smooth0 * scale0 - smooth1 * scale1 + (bright0 - bright1) * f32(2))
-            out[where[0][p], where[1][j], WEIGHT] = gap[where[0][p], where[1][j], WEIGHT] = 0
+            out[where[0][p], where[1][j], WEIGHT], gap[where[0][p], where[1][j], WEIGHT] = scale, 0
 
 
 @fast

@@ -27,7 +27,8 @@ from stages.light.own_light import with_own_light
 from stages.light.reconstruction import Neighbours
 from stages.light.reference import halved, reference_radiance
 from stages.light.scene import Scene
-from stages.light.transport import QUALITY, Quality, Rays, cached_light_set, integrate_with_ends
+from stages.light.terms import BOUNCED
+from stages.light.transport import QUALITY, Quality, cached_light_set, integrate_with_ends
 from stages.report.bounces import MATERIALS, material
 from stages.report.rows import Row
 
@@ -132,7 +133,7 @@ class _View:
     ) -> dict[str, list[Tensor]]:
         """Tone-mapped radiance of some points, of each material under each light; its noise is averaged if it is a view."""
         assert ends is not None
-        counts, exchange = Rays.plan(quality, self._lights, 0).counts, self._between.exchange
+        counts, exchange = BOUNCED.counts(quality.lobe), self._between.exchange
         near = Neighbours.of(points) if quality.smooth else None
         result: dict[str, list[Tensor]] = {}
         for name, own in self._own.items():
@@ -157,7 +158,7 @@ def against_quadrature(scene: Scene, points: GBuffer, seed: int) -> list[Row]:
         return []
     sides = between.cells.sides(scene)
     (direct,), ends = integrate_with_ends(scene, some, lights, CONVERGED, seed, between.cells)
-    counts, rows = Rays.plan(CONVERGED, lights, 0).counts, []
+    counts, rows = BOUNCED.counts(CONVERGED.lobe), []
     assert ends is not None
     for name, pair in MATERIALS.items():
         if min(values[3] for values in pair) < LEAST_ROUGHNESS:

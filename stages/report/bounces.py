@@ -33,7 +33,8 @@ from stages.light.lights import BUILTIN
 from stages.light.own_light import with_own_light
 from stages.light.reconstruction import Neighbours
 from stages.light.scene import Scene
-from stages.light.transport import QUALITY, Rays, cached_light_set, integrate_with_ends
+from stages.light.terms import BOUNCED
+from stages.light.transport import QUALITY, cached_light_set, integrate_with_ends
 from stages.report.renderers import NEEDS, pole_to_pole, read_arrays, write_arrays
 from stages.report.rows import write_csv
 
@@ -85,7 +86,7 @@ def measure(python: str, mesh: str, scene: Scene, lights: Sequence[Environment],
     for light in lights:
         exchange, light_set = make_exchange(scene, cells, [light], 0, bounces), cached_light_set((light,))
         transports, ends = integrate_with_ends(scene, points, light_set, QUALITY["standard"], 0, cells)
-        counts, sides = Rays.plan(QUALITY["standard"], light_set, 0).counts, cells.sides(scene)
+        counts, sides = BOUNCED.counts(QUALITY["standard"].lobe), cells.sides(scene)
         near = Neighbours.of(points)
         assert ends is not None
         for name, pair in MATERIALS.items():
