@@ -8,7 +8,7 @@ from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import spread
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import PARTS, PEELS, SHAPES, SHOWS, gathering
+from stages.prior.places import BAND, PARTS, PEELS, SHAPES, SHOWS, gathering
 from stages.prior.stuffs import GENERIC, KNOWN
 from stages.prior.tokens import FOODS, PAINTED, Join
 
@@ -193,7 +193,7 @@ def _laid(phrases: list[Phrase]) -> list[Phrase]:
 def _only_names(phrase: Phrase, before: list[Phrase]) -> bool:
     """Whether a phrase after a comma only says what thing has the stuffs before it: "chrome flaking off brass, a faucet"."""
     alone = phrase.thing and not (phrase.substance or phrase.colors or phrase.unknown or phrase.animal)
-    return bool(alone) and phrase.join.kind == "comma" and bool(before[0].substance)
+    return bool(alone) and phrase.join.kind == "comma" and bool(before[0].substance) and not phrase.region
 
 
 def _there(phrase: Phrase) -> bool:
@@ -362,7 +362,9 @@ def _describe(before: Phrase, phrase: Phrase) -> None:
 def _lend(before: Phrase, phrase: Phrase, after: Phrase | None, result: list[Phrase]) -> None:
     """A part without a stuff takes that of its neighbour: "gold rim and handle", "rim and handle of gold"."""
     if phrase.join.kind == "and" and before.region and before.says_what:
-        result.append(replace(before, region=phrase.region, where=phrase.where, join=phrase.join))
+        ring = before.where.startswith(("at ", "near ", "around ")) and before.region.share <= BAND
+        region = phrase.region._replace(share=before.region.share) if ring and phrase.region else phrase.region
+        result.append(replace(before, region=region, where=phrase.where, join=phrase.join))
     elif after and after.join.kind == "and" and after.region and after.says_what:
         result.append(replace(after, region=phrase.region, where=phrase.where, join=phrase.join))
 

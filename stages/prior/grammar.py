@@ -15,7 +15,7 @@ from stages.prior.motifs import CLOTHS, PAINTS
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import gathered
 from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
-from stages.prior.places import CLOTHES, DETAILS, PARTS, SHAPES, Region, gathering
+from stages.prior.places import BAND, CLOTHES, DETAILS, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import PAINTED, Join, Token, tokens_of
 
@@ -186,8 +186,8 @@ def _begins(token: Token, now: Phrase) -> bool:
 def _told_of_part(run: Sequence[Token]) -> bool:
     """Whether what stands between a thing and a part of it is that of the part."""
     kinds = [token.kind for token in run if token.kind not in ("size", "name", "unknown")]
-    said = kinds[1:-1]
-    return kinds[:1] == ["thing"] and bool(said) and set(said) <= {"color", "substance", "finish"} and {*said} != {"finish"}
+    said = set(kinds[1:-1])
+    return kinds[:1] == ["thing"] and bool(said - {"finish"}) and said <= {"color", "substance", "finish", "weather"}
 
 
 def _paints_part(token: Token, now: Phrase, after: Sequence[Token]) -> bool:
@@ -302,9 +302,10 @@ def _is_small(phrase: Phrase) -> bool:
     return bool(phrase.part) or (phrase.region is not None and phrase.region.kind in ("badge", "details"))
 
 
-RINGED = ("around", "along the", "on top", "on the top", "at the top", "near the top", "at the base", "at the bottom")
-RINGS, BAND = ("ring", "rings", "band", "bands", "stripe", "stripes", "line", "lines", "strap", "hoop", "hoops"), 0.08
-"""Patterns of which one lies around a place, and its share of the extent."""
+RINGED = ("around", "along the", "on top", "on the top", "at top", "at the top", "near the top", "near top", "at the base",
+          "at bottom", "at the bottom", "near the base")
+RINGS = ("ring", "rings", "band", "bands", "stripe", "stripes", "line", "lines", "strap", "hoop", "hoops")
+"""Patterns of which one lies around a place."""
 
 ROUGHENED = ("frosted", "matte")
 """Words of finish that are part of a stuff's name."""
@@ -331,6 +332,9 @@ def _name(phrase: Phrase, text: str) -> None:
     elif text in FIGURES and old not in (*GENERIC, *PAINTED):  # "a brass horn", "with an obsidian hide"
         if phrase.join is not FIRST and phrase.region is None:
             phrase.region, phrase.where = (PARTS["body"], "body") if text in COATS else (DETAILS, text)
+    elif old == "painted" and text in GILDING:
+        phrase.substance = text  # "a lion painted gold"
+        phrase.join = Join("paint") if phrase.join.kind in ("comma", "with") else phrase.join
     elif old in ("painted", "powder-coated", "powder coated") and family(text) in ("metal", "wood"):
         phrase.substance = f"painted {family(text)}"  # "painted yellow metal", "powder-coated black steel"
         phrase.colors += [word for word in text.split(" ") if word in COLORS and not phrase.colors]
@@ -350,6 +354,10 @@ def _name(phrase: Phrase, text: str) -> None:
         phrase.substance = text
         if family(old) != family(text) or text in PATTERNED:
             phrase.colors = phrase.colors or ([] if phrase.animal else [old])
+
+
+GILDING = ("gold", "golden", "silver", "bronze", "copper", "brass", "chrome")
+"""Metals that are paints, too."""
 
 
 COATS = frozenset(["skin", "hide", "scales", "feathers", "fur", "hair", "pelt", "shell", "flesh"])

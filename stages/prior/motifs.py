@@ -21,7 +21,7 @@ def _on_color(phrases: list[Phrase]) -> list[Phrase]:
     if len(phrases) < 3:
         return phrases
     first, marks, ground, *rest = phrases
-    bare = bool(first.thing) and not (any(map(is_hue, first.colors)) or first.animal or first.region)
+    bare = bool(first.thing or first.substance) and not (any(map(is_hue, first.colors)) or first.animal or first.region)
     hue = ground.join.kind == "on" and ground.color_only and not ground.region
     badge = marks.region is not None and marks.region.kind == "badge"
     if bare and hue and (marks.where in SHAPES or badge) and marks.says_what:

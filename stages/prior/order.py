@@ -173,6 +173,8 @@ def _of_what(thing: Phrase, over: list[Phrase]) -> Order:
         if k and not (gathering(over[k - 1].substance) or over[k - 1].weather):
             break
         painted = not (k or thing.weather or RUSTY & set(thing.thing.split(" "))) and _paints(phrase)
+        bound = phrase.join.kind == "band" and bool(phrase.substance) and family(phrase.substance) in ("leather", "fabric")
+        painted |= bound and _upholstered(thing)  # "a book bound in leather"
         whole = (_covers(phrase) or painted or _of_usual(phrase, thing)) if named or not k else False
         part = phrase.part and (k or not phrase.substance or phrase.join.kind == "comma")
         elsewhere = phrase.region or part or not phrase.says_what
@@ -258,6 +260,16 @@ def _either_side(first: Phrase, over: list[Phrase]) -> Order:
     return first, over
 
 
+SEATED = ("chair", "stool", "bench", "throne", "pew", "armchair")
+"""Things of which cloth and leather are where one sits."""
+
+
+def _is_cloth(phrase: Phrase) -> bool:
+    """Whether it is cloth or leather that lies beside other parts."""
+    cloth = bool(phrase.substance) and family(phrase.substance) in ("fabric", "leather")
+    return cloth and phrase.join.kind in ("with", "and", "comma") and not (phrase.thing or phrase.part or phrase.within)
+
+
 def region_of(phrase: Phrase) -> str:
     """The kind of place where a phrase lies, if that is said."""
     return phrase.region.kind if phrase.region else ""
@@ -298,6 +310,9 @@ def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
                 names += [part.join.kind] if part.join.kind not in ("cover", "top", "stripe") else []
                 found = (places.get(word) for name in names if name for word in (name, name.split(" ")[-1]))
                 part.region = next(filter(None, found), part.region)
+        pair = phrase is over[0] and phrase.join.kind == "and"  # "in black and red leather"
+        if not (phrase.region or pair) and name.split(" ")[-1] in SEATED and _is_cloth(phrase):
+            phrase.region, phrase.where = PARTS["upholstery"], "upholstery"  # "a chair with gold legs and pink velvet"
     for one, other in pairwise(over):
         again = one.region == other.region is not None and one.substance == other.substance and one.where == other.where
         if again and other.join.kind == "and" and one.colors and other.colors and not other.within:

@@ -157,6 +157,9 @@ WET = {"wet": 0.35, "damp": 0.6, "oily": 0.45, "slimy": 0.35}
 SOAKED, POROUS, SOAK = frozenset(["wet", "damp"]), 0.6, 0.72
 """Words of water, the roughness from which on a stuff drinks it, and how much darker it is then."""
 
+BAND = 0.08
+"""Share of the extent of a single band."""
+
 DETAILS = Region("details", 0.1, 0.04, 0.1)
 """Where a part lies that no table knows."""
 
@@ -182,7 +185,7 @@ JOINED = {
     **{part: PARTS[part] for part in ("head", "wings", "eyes", "blade", "lid", "neck", "belly", "back", "feet", "roof", "front",
                                       "tail", "beak", "hair", "horns", "sleeves", "base")},
     "dip": Region("below", 0.5, wear=0.2), "except": PARTS["body"], "crevices": PARTS["crevices"],
-    "ends": Region("sides", 0.15),
+    "ends": Region("sides", 0.15), "stuck": Region("below", 0.3),
     "shell": PARTS["carapace"], "bottom": PARTS["base"], "legs": PARTS["legs"], "seat": PARTS["seat"],
     "paint": Region("all", 1.0),
 }  # fmt: skip

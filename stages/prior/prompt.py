@@ -43,6 +43,7 @@ from stages.prior.places import (
     PRINTED,
     SHAPES,
     SHELLED,
+    SHOWS,
     SOAK,
     SOAKED,
     WEATHER,
@@ -187,6 +188,8 @@ class Reading:
             return [Layer(coat, (PEELED,), 2e-4), *self._weather(rest, (PEELED,), beneath)]
         if phrase.region is None and phrase.join.kind in ("on", "over") and phrase.coats:
             return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (), beneath)]
+        if phrase.region is None and phrase.coats and phrase.join.kind in BESIDE and SHOWS & set(phrase.weather):
+            return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (WHOLE,), beneath)]  # "with scratched red paint"
         if phrase.animal:
             _, marks, region = ANIMALS[phrase.animal]
             mark = _color(phrase) if phrase.colors else _triple(rgb(marks.split()[0]))
@@ -270,9 +273,8 @@ class Reading:
         stand = phrase.thing or phrase.boards or phrase.substance in PATTERNED
         if (phrase.part or (stand and phrase.join.beneath)) and phrase.join.kind == "on":
             return PARTS["stand"]  # "a cannon on a wooden carriage"
-        if phrase.thing and phrase.colors and (lives(phrase.thing) or phrase.thing in ("crane", "star", "heart")) and (
-            phrase.join.kind in BESIDE
-        ):
+        drawn = bool(phrase.thing) and (lives(phrase.thing) or phrase.thing == "crane")
+        if drawn and phrase.colors and phrase.join.kind in BESIDE:
             return SHAPES["motifs"]  # "a kimono with gold cranes"
         if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
             return DETAILS

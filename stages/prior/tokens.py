@@ -208,6 +208,8 @@ SIMILES = (
     (r"\bwhite-?washed (?=[a-z])", "white painted "),
     (r"\bcamouflage in ([a-z]+) (?:tones|colou?rs|shades)\b", r"\1 camouflage"),
     (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ ){0,3}paint\b)", "peeling "),
+    (r"\b(cracks|gaps|seams|grooves|joints|holes|veins) (?:filled|inlaid|repaired|sealed|packed|fixed|mended) (?:with|in) "
+     r"([a-z ]+?)(?=$|[,.;]| and | on )", r"\2 \1"),
     (r"\b(?:multi-?colou?red|colou?rful)\b", "rainbow patches"),
     (r"\b(?:bright |in )?(?:the )?primary colou?rs\b", "in red, yellow and blue"),
     (r"\b(?:soft )?pastel colou?rs\b", "pastel pink, pastel blue and pastel yellow"),
@@ -488,9 +490,16 @@ def _resolved(found: list[Token]) -> list[Token]:
                 names = set()  # "an emerald brooch"
             if names or shaped or any(t.kind == "substance" for t in behind):
                 token = token._replace(kind="color", value=None)
+        placed = bool(ahead) and ahead[0].kind == "part" and ahead[0].text.startswith("on ")  # "cherry on top"
+        after = [t.text if t.kind == "join" else t.kind for t in found[number + 1 : number + 3]]
+        opens = not result and not ahead and (after[:1] == ["with"] or after == ["comma", "color"])  # "rose, red with"
+        if token.kind == "color" and token.text in OBJECTS and not behind and (placed or opens):
+            token = token._replace(kind="thing", value=None)
         named = token.article or (any(t.article for t in behind) and any(t.text in COMMON for t in behind))
         if token.kind == "color" and named and not ahead and token.text in OBJECTS:
             token = token._replace(kind="thing", value=None)  # "an orange"
+        elif token.text == "star" and behind and _hue(behind[0]) and not names and any(t.kind == "thing" for t in result):
+            token = Token("part", "star emblem", PARTS["star emblem"])  # "a helicopter with a white star"
         elif place := _own_part(token, result):
             token = Token("part", token.text, place)  # "a drum with a white skin"
         elif token.text in ("shell", "carapace") and any(t.text in BEARERS for t in result):
@@ -753,6 +762,9 @@ def _table() -> tuple[dict[str, Token], int]:
     enter("part", {f"up from {the}{place}": Region("below", 0.45) for the in ("", "the ", "its ") for place in PARTS})
     for side, strip in (("base", "below"), ("bottom", "below"), ("top", "above")):
         enter("part", {f"{word} {side}": Region(strip, 0.18) for word in ("along the", "along its")})
+    aside = [place for place, region in PARTS.items() if region.kind == "sides"]
+    for side in ("left", "right"):
+        enter("part", {f"{side} {place}": Region(side, 0.5 * PARTS[place].share) for place in aside})
     enter("part", {"on one side": Region("right", 0.4), "on the other side": Region("left", 0.4)})
     enter("aside", ASIDE)
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
