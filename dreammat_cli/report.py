@@ -70,6 +70,8 @@ def conditions(prep: Path, output: Path, common: Common, **chosen: Any) -> None:
 @click.option("--steps", type=click.IntRange(1), default=PRIOR["steps"], metavar="N",
               help="Of every distillation.  [default: as `distill`]")
 @click.option("--views", type=click.IntRange(1, 9999), default=PRIOR["views"], show_default=True, help="Cameras of a mesh.")
+@click.option("--bounces", type=click.IntRange(0, 8), default=PRIOR["bounces"], show_default=True,
+              help="As for `conditions`.")
 @click.option("--ladder/--no-ladder", default=PRIOR["ladder"], show_default=True,
               help="Also let the model alone hold the material, and take conditions away from it, as the paper does.")
 @common_options

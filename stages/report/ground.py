@@ -127,6 +127,11 @@ class Ground:
         return torch.stack([t.E for t in self._traced(list(read_lights(())[0]))]).sum(0).numpy()
 
     @cached_property
+    def openness(self) -> NDArray[np.float32]:
+        """What matt white gives back of an even sky, (lit, 3): 0.96 in the open, since it mirrors the rest."""
+        return self._traced([Environment("even", np.ones((16, 32, 3), np.float32))])[0].E.numpy()
+
+    @cached_property
     def new_lights(self) -> list[Transport]:
         """Of environments that nothing was trained on, at the lit texels."""
         light = preview_light()

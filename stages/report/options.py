@@ -36,6 +36,8 @@ class PriorReportOptions:
     """of every distillation; None for the default"""
     views: int = 48
     """cameras of every mesh"""
+    bounces: int = 0
+    """of light between surfaces, in the pictures by which the material is found"""
     ladder: bool = True
     """also take conditions away, as the paper's ablation does: 120 more runs"""
 

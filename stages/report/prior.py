@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.stage import conditions
 from stages.core.artifact import load_npz
-from stages.core.color import log_correlation, reinhard, srgb_decode, srgb_encode
+from stages.core.color import DARKEST, log_correlation, reinhard, srgb_decode, srgb_encode
 from stages.core.progress import Progress, silent
 from stages.core.schemas import PREP
 from stages.core.shading import Material, shade
@@ -50,6 +50,10 @@ REGION = 0.25
 TALL = 0.5
 """Compositions are judged on meshes at least this high, in object sizes."""
 
+CAVITIES = 0.1
+"""Standard deviation of the log of how much of the sky is seen, from which on a shape has cavities."""
+
+
 @dataclass(frozen=True)
 class Run:
     """One distillation. lights: "all" or "one". alone: nothing holds the field near what the words call for."""
@@ -73,11 +77,12 @@ class Run:
 class Row:
     """What a run gave. Colours are sRGB; what does not apply to a run is empty.
 
-    decided: share of texels that are metal or not. light_correlation: of log albedo and log irradiance. shared_pattern: of log
-    albedo with the first seed's, texel by texel. identified: nearest to its own truth of `prompts.IDENTIFIED`. regions: share
-    of a composition's two regions nearer to their own material. contrast_kept: percent of the recipe's, at wavelengths of
-    2 … 64 pixels, of the ladder's runs; nan where it has none. relight_percent: tone-mapped RMSE against the ideal material,
-    under lights never trained on.
+    decided: share of texels that are metal or not. light_correlation: of log albedo and log irradiance.
+    cavity_correlation: of log albedo and the log of how much of an even sky is seen; nan of a shape without cavities.
+    shared_pattern: of log albedo with the first seed's, texel by texel. identified: nearest to its own truth of
+    `prompts.IDENTIFIED`. regions: share of a composition's two regions nearer to their own material. contrast_kept: percent
+    of the recipe's, at wavelengths of 2 … 64 pixels, of the ladder's runs; nan where it has none. relight_percent:
+    tone-mapped RMSE against the ideal material, under lights never trained on.
     """
 
     prompt: str
@@ -97,6 +102,7 @@ class Row:
     roughness_error: float
     color_difference: float
     light_correlation: float
+    cavity_correlation: float
     relight_percent: float
     shared_pattern: str
     identified: str
@@ -164,7 +170,7 @@ def prepared(folder: Path, options: PriorReportOptions, progress: Progress) -> d
         ready, up = folder / name / "prep.npz", "y" if options.mesh else "z"
         ready.parent.mkdir(exist_ok=True)
         prep(path, ready, PrepOptions(up=up, texture_size=TEXTURE, padding=4))
-        asked = ConditionsOptions(views=options.views, quality="draft")
+        asked = ConditionsOptions(views=options.views, quality="draft", bounces=options.bounces)
         conditions(ready, folder / name / "conditions", asked, progress=progress)
         heights[name] = float(np.ptp(load_npz(ready, PREP)["vertices"][:, 2]))
     return heights
@@ -209,9 +215,11 @@ def measure(run: Run, ground: Ground, maps: NDArray[np.float32], twin: NDArray[n
     found = np.r_[colors.mean(0), maps[:, 3:].mean(0)]
     if run.prompt.top is not None:  # on the whole it is half of each
         wanted = (wanted + run.prompt.top.row()) / 2
-    correlation, relit = float("nan"), float("nan")
+    correlation = cavities = relit = float("nan")
     if run.prompt.top is None:
         correlation = log_correlation(maps[ground.lit, :3], ground.irradiance)
+        if np.log(ground.openness[:, 0] + DARKEST).std() > CAVITIES:
+            cavities = log_correlation(maps[ground.lit, :3], ground.openness)
         relit = relight(ground, maps[ground.lit], wanted)
     truths = np.stack([p.meaning.row() for p in IDENTIFIED])
     own = run.prompt in IDENTIFIED and IDENTIFIED[measures.nearest(found, truths)] == run.prompt
@@ -234,6 +242,7 @@ def measure(run: Run, ground: Ground, maps: NDArray[np.float32], twin: NDArray[n
         roughness_error=abs(float(found[3] - wanted[3])),
         color_difference=measures.color_difference(found[:3], wanted[:3]),
         light_correlation=correlation,
+        cavity_correlation=cavities,
         relight_percent=relit,
         shared_pattern="" if twin is None else f"{log_correlation(maps[:, :3], twin[:, :3]):.3f}",
         identified=str(own) if run.prompt in IDENTIFIED else "",
@@ -309,6 +318,8 @@ def summarise(rows: list[Row]) -> Iterable[Summary]:
         shares = [float(r.contrast_kept.split()[k]) for r in alone]
         yield line("contrast kept, %", f"e full, {wave} pixels", [x for x in shares if not np.isnan(x)], ">= 50")
     yield line("baked light, |correlation|", "one material", [abs(r.light_correlation) for r in one], "<= 0.06")
+    hollow = [abs(r.cavity_correlation) for r in one if not np.isnan(r.cavity_correlation)]
+    yield line("baked light in cavities, |correlation|", "one material", hollow, "<= 0.08")
     yield line("two seeds, distance of means", "all", distances(full), "")
     shared = [abs(float(r.shared_pattern)) for r in one if r.shared_pattern]
     yield line("two seeds, |correlation| of patterns", "one material", shared, "")

@@ -68,9 +68,9 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         (ground, "read_lights", lambda _: ([lights.preview_light()], {}, {})),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, less)
-    ball = tmp_path / "ball.obj"
-    trimesh.creation.icosphere(subdivisions=2).export(ball)
-    options = PriorReportOptions(mesh=(str(ball),), seeds=2, prompts=1, steps=2, views=1)
+    pipe = tmp_path / "pipe.obj"
+    trimesh.creation.annulus(0.2, 0.3, 1.0).export(pipe)
+    options = PriorReportOptions(mesh=(str(pipe),), seeds=2, prompts=1, steps=2, views=1)
     lines = prior.report_prior(tmp_path, options)
     with (tmp_path / "prior.csv").open() as stream:
         rows = list(csv.DictReader(stream))
@@ -80,9 +80,13 @@ def test_small_report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert all(0 <= float(row["decided"]) <= 1 and float(row["relight_percent"]) >= 0 for row in rows if not row["regions"])
     assert all(bool(row["shared_pattern"]) == (row["seed"] == "1") for row in rows)
     assert all(-1 <= float(row["shared_pattern"]) < 0.9 for row in rows if row["seed"] == "1"), "another seed, another pattern"
-    assert {line.measure for line in lines} >= {"roughness error", "identified, %", "baked light, |correlation|"}
+    assert {line.measure for line in lines} >= {
+        "roughness error", "identified, %", "baked light, |correlation|", "baked light in cavities, |correlation|"
+    }  # fmt: skip
+    openness = ground.Ground.of(tmp_path / "meshes/pipe/prep.npz", tmp_path / "meshes/pipe/conditions", 512).openness[:, 0]
+    assert 0 < openness.min() < 0.5 and openness.max() == pytest.approx(0.96, rel=0.02)
     assert all(line.runs for line in lines)
     assert (tmp_path / "prior.png").stat().st_size > 10_000
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs").rglob("material.npz")}
-    again = {prior.carry_out(run, tmp_path, options) for run in prior.plan(options, {"ball": 1.0})}
+    again = {prior.carry_out(run, tmp_path, options) for run in prior.plan(options, {"pipe": 1.0})}
     assert before == {path: path.stat().st_mtime_ns for path in again}, "a second call works on what is there"
