@@ -34,7 +34,7 @@ DEFAULT = defaults(BakeOptions)
               help=f"Texture size: {', '.join(map(str, SIZES))}.  [default: 2048; of several texture sets, by their share of "
                    "the surface]")
 @click.option("--supersample", type=click.IntRange(1, 8), default=DEFAULT["supersample"], show_default=True,
-              metavar="N", help="N x N samples in texels that borders run through; one in others.")
+              metavar="N", help="N samples on a texel's diagonal; N x N in texels that borders run through.")
 @click.option("--relief", type=click.FloatRange(0, 2), default=DEFAULT["relief"], show_default=True, metavar="X",
               help="How strongly the material's relief is shown, as a multiple; 0 writes no normal and height maps of it.")
 @library_option

@@ -14,7 +14,7 @@ class BakeOptions:
     """How textures are baked."""
 
     size: int | None = None  # texels along each edge, one of SIZES; None: 2048, of several sets by their share of the surface
-    supersample: int = 2  # samples along the edge of a texel that differs from its neighbours, averaged; of others one
+    supersample: int = 2  # N samples on a texel's diagonal, averaged; N x N where it differs from its neighbours
     preview_size: int = 320  # pixels along each edge of one view of preview.png
     occlusion_rays: int = 128  # of each point whose ambient occlusion is traced
     relief: float = 1.0  # how strongly what stands out of the surface is shown, as a multiple; 0 none

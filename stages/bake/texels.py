@@ -1,8 +1,8 @@
 """The material of every texel: the recipe's mean over the samples inside it that lie on a chart, and what was learnt there.
 
-One sample is enough where a texel is like its neighbours; where a border runs between them there are more. Each is evaluated at
-its own point in space, so a texel on a chart's rim holds nothing from outside. A texel that a chart touches without covering
-any of its samples takes the surface point nearest to its centre. The residual is as
+Samples on its diagonal are enough where a texel is like its neighbours; where a border runs between them there are more. Each is
+evaluated at its own point in space, so a texel on a chart's rim holds nothing from outside. A texel that a chart touches without
+covering any of its samples takes the surface point nearest to its centre. The residual is as
 smooth as the views were coarse: it is looked up once a texel. """
 
 import numpy as np
@@ -16,7 +16,7 @@ from stages.core.progress import Progress
 from stages.material import surface as material_surface
 from stages.material.evaluate import COLUMNS, evaluate
 from stages.material.learnt import LearntMaterial
-from stages.material.uneven import uneven
+from stages.material.uneven import patterns, uneven
 
 TASKS = 8
 """Bands between two reports of progress."""
@@ -54,39 +54,41 @@ class Texels:
         """The recipe's material of every texel that a chart touches: (size, size, 6), see `COLUMNS`; 0 off the charts.
 
         Args:
-            supersample: samples along the edge of a texel where texels differ much from their neighbours (`uneven`); of others
-            there is one. groups: of `patches`.
+            supersample: N samples on the diagonal of each texel; N x N in those that differ much from their neighbours
+            (`uneven`). groups: of `patches`.
         """
         size, features = self._layout.size, self._features(groups)
         on_chart = self._touched.triangle >= 0
-        maps = np.zeros((size, size, COLUMNS), np.float32)
-        bare = on_chart & ~self._sample(1, on_chart, features, maps, progress)
+        maps, counts = np.zeros((size, size, COLUMNS), np.float32), np.zeros((size, size), np.int32)
+        first, others = patterns(supersample)
+        self._sample(first, on_chart, features, maps, counts, progress)
+        bare = on_chart & (counts == 0)
         maps[bare] = self._evaluate(self._touched.where(bare), 1, features, np.flatnonzero(bare))
-        if supersample > 1:
-            self._sample(supersample, uneven(maps, on_chart), features, maps, progress)
+        if others.any():
+            self._sample(others, uneven(maps, on_chart), features, maps, counts, progress)
         return maps
 
     def _sample(  # type: ignore[no-untyped-def]
-        self, supersample: int, chosen: NDArray[np.bool_], features, maps: NDArray[np.float32], progress: Progress
-    ) -> NDArray[np.bool_]:
-        """Write the mean of the samples in each chosen texel (size, size) that lie on a chart. Returns: where any does."""
-        counts = np.zeros(chosen.shape, np.int32)
+        self, pattern: NDArray[np.bool_], chosen: NDArray[np.bool_], features, maps: NDArray[np.float32],
+        counts: NDArray[np.int32], progress: Progress,
+    ) -> None:  # fmt: skip
+        """Let samples of a pattern in each chosen texel (size, size) that lie on a chart count in its mean, and count them."""
+        supersample = len(pattern)
         todo = [rows for rows in bands(len(chosen)) if chosen[rows.start : rows.stop].any()]
 
         def bake_band(rows: range) -> None:
             band = slice(rows.start, rows.stop)
-            wanted = np.repeat(np.repeat(chosen[band], supersample, 0), supersample, 1)
+            wanted = np.kron(chosen[band], pattern)
             samples = covered_samples(self._layout, supersample, rows)
             covered = wanted & (samples.triangle >= 0)
             row, column = (k // supersample for k in np.nonzero(covered))
             values = self._evaluate(samples.where(covered), supersample, features, (rows.start + row) * len(maps) + column)
-            _average(covered, values, supersample, maps[band], counts[band])
+            _count_in(covered, values, supersample, maps[band], counts[band])
 
         for first in range(0, len(todo), TASKS):
             progress("texels", first, len(todo))
             in_parallel(bake_band, todo[first : first + TASKS])
         progress("texels", len(todo), len(todo))
-        return counts > 0
 
     def _features(self, groups: Patches) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
         """Convexity and occlusion of each texel, flat; None where the recipe asks for neither."""
@@ -128,19 +130,15 @@ def texel_size(corners: NDArray[np.float32], layout: Layout) -> NDArray[np.float
 
 
 @compiled
-def _average(covered, values, supersample, maps, counts):  # type: ignore[no-untyped-def]
-    """Mean of the covered samples of each texel that has some. values: (N, C), row by row. counts: of samples, 0 at first."""
+def _count_in(covered, values, supersample, maps, counts):  # type: ignore[no-untyped-def]
+    """Let covered samples count in the mean of their texel. values: (N, C), row by row. counts: of those that are in it."""
     taken = 0
     for i in range(covered.shape[0]):
         for j in range(covered.shape[1]):
             if covered[i, j]:
                 k, m = i // supersample, j // supersample
-                for c in range(values.shape[1]):
-                    maps[k, m, c] = values[taken, c] + (maps[k, m, c] if counts[k, m] else np.float32(0))
                 counts[k, m] += 1
-                taken += 1
-    for i in range(counts.shape[0]):
-        for j in range(counts.shape[1]):
-            if counts[i, j] > 1:
+                share = np.float32(1) / np.float32(counts[k, m])
                 for c in range(values.shape[1]):
-                    maps[i, j, c] /= counts[i, j]
+                    maps[k, m, c] += (values[taken, c] - maps[k, m, c]) * share
+                taken += 1

@@ -1,7 +1,7 @@
-"""Which texels one sample does not tell: those that differ most from the texel beside them. A border runs through some of them.
+"""At how many points a texel is asked: on its diagonal, and all over it where a border may run through.
 
-A recipe holds nothing finer than the texel that asks, so elsewhere one sample is the texel's mean, nearly; of the texels beside
-a border the samples fall on one side or the other. """
+A recipe holds nothing finer than what each point stands for, so two points on the diagonal tell a texel's mean nearly; of the
+texels beside a border they fall on one side or the other, and these are the ones that differ most from their neighbours. """
 
 import math
 
@@ -16,6 +16,12 @@ picture."""
 
 MOST = 1 / 8
 """Share of the texels that are taken at most: of grain that differs everywhere, those that differ most."""
+
+
+def patterns(supersample: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which of N x N points inside a texel are asked first, and which besides where it is uneven; (N, N) each, rows down."""
+    first = np.eye(supersample, dtype=np.bool_)
+    return first, ~first
 
 
 def uneven(maps: NDArray[np.float32], known: NDArray[np.bool_], wrap: bool = False) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from stages.material.recipe import Coat
 from stages.material.relief import STEEPEST, gentle
 from stages.material.substances import METRES
 from stages.material.surface import Surface
-from stages.material.uneven import uneven
+from stages.material.uneven import patterns, uneven
 
 SIZES = 1024, 4096
 """Texels along an edge of the two textures."""
@@ -26,8 +26,8 @@ def flicker(look: str, share: float = 1 / 8, supersample: int = 1, relief: float
 
     A pixel of the view is as large as two texels of the smaller texture, and both are shaded texel by texel.
 
-    Args: share: of the square's edge that is looked at. supersample: samples along the edge of a texel of the smaller one that
-    borders run through, as in `bake`. relief: 0 looks at a flat plate.
+    Args: share: of the square's edge that is looked at. supersample: of the smaller one's texels, as in `bake`.
+    relief: 0 looks at a flat plate.
     """
     small, large = (textures(look, size, share, s) for size, s in zip(SIZES, (supersample, 1), strict=True))
     pixels = round(SIZES[0] * share) // 2
@@ -37,24 +37,26 @@ def flicker(look: str, share: float = 1 / 8, supersample: int = 1, relief: float
 
 def textures(look: str, size: int, share: float, supersample: int) -> NDArray[np.float32]:
     """(N + 2, N + 2, 6) texels of a part of a square, see `COLUMNS`, and one beyond each side. size: along the whole edge."""
-    one = sampled(look, size, share, 1)
-    if supersample == 1:
+    first, others = patterns(supersample)
+    one = sampled(look, size, share, first)
+    if not others.any():
         return one
-    borders = uneven(one, np.ones(one.shape[:2], np.bool_))
-    return np.where(borders[..., None], sampled(look, size, share, supersample), one)
+    borders = uneven(one, np.ones(one.shape[:2], np.bool_))[..., None]
+    return np.where(borders, one + (sampled(look, size, share, others) - one) * np.float32(others.mean()), one)
 
 
-def sampled(look: str, size: int, share: float, samples: int) -> NDArray[np.float32]:
-    """The same, each the mean of samples² points."""
-    count = round(size * share) + 2
-    across = ((np.arange(count * samples) + 0.5) / samples - 1).astype(np.float32) / np.float32(size)
-    u, v = (a.ravel() for a in np.meshgrid(across, across))
+def sampled(look: str, size: int, share: float, pattern: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """The same, each the mean of some points. Args: pattern: of `patterns`."""
+    count, samples = round(size * share) + 2, len(pattern)
+    inside = (np.argwhere(pattern).T + 0.5) / samples - 1  # rows, columns
+    down, across = (np.arange(count)[:, None] + shift for shift in inside)
+    v, u = (a.astype(np.float32).ravel() / np.float32(size) for a in np.broadcast_arrays(down[:, None], across[None]))
     point = np.stack([u, v, np.zeros_like(u)], 1)
     normal = np.broadcast_to(np.array([0, 0, 1], np.float32), point.shape)
     surface = Surface.bare(point, normal, 1 / (size * samples))
     world = Place(np.ascontiguousarray(point.T), np.stack([u, v]), np.zeros(len(u), np.int32), surface.footprint)
     values = coated(Coat(look, metres=METRES[look]), surface, world, WHOLE, 0)
-    return values.reshape(count, samples, count, samples, COLUMNS).mean((1, 3))
+    return values.reshape(count, count, -1, COLUMNS).mean(2)
 
 
 def view(maps: NDArray[np.float32], texel: float, pixels: int, relief: float) -> NDArray[np.float64]:
