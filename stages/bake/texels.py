@@ -1,8 +1,8 @@
 """The material of every texel: the recipe's mean over the samples inside it that lie on a chart, and what was learnt there.
 
-Samples on its diagonal are enough where a texel is like its neighbours; where a border runs between them there are more. Each is
-evaluated at its own point in space, so a texel on a chart's rim holds nothing from outside. A texel that a chart touches without
-covering any of its samples takes the surface point nearest to its centre. The residual is as
+Samples on its diagonal are enough where a texel is like its neighbours; where a border runs between them there are more. Each
+is evaluated at its own point in space, so a texel on a chart's rim holds nothing from outside. A texel that a chart touches
+without covering any of its samples takes the surface point nearest to its centre. The residual is as
 smooth as the views were coarse: it is looked up once a texel. """
 
 import numpy as np

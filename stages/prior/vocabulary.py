@@ -110,12 +110,12 @@ class Vocabulary:
 
     def _spelt_alike(self, word: str) -> NDArray[np.float32]:
         grams = trigrams(word)
-        overlap = {i: len(grams & other) / len(grams | other) for i, other in self._trigrams() if grams & other}
+        overlap = {i: len(grams & other) / len(grams | other) for i, other in self._trigrams if grams & other}
         best = sorted(overlap, key=lambda i: (-overlap[i], i))[:3]
         near = [i for i in best if overlap[i] >= ALIKE]
         return self.vectors[near].mean(0) if near else np.zeros_like(self.vectors[0])
 
-    @functools.cache  # noqa: B019  (one table lives as long as the process)
+    @functools.cached_property
     def _trigrams(self) -> list[tuple[int, frozenset[str]]]:
         return [(i, trigrams(word)) for word, i in self.index.items()]
 

@@ -1,3 +1,6 @@
+import gc
+import weakref
+
 import numpy as np
 import pytest
 import torch
@@ -50,6 +53,15 @@ def test_an_unknown_word_takes_the_place_of_the_nearest_spelling(
 
 def test_a_word_that_resembles_nothing_is_silent(vocabulary: Vocabulary) -> None:
     assert not vocabulary.vector("qxzvkj").any()
+
+
+def test_a_vocabulary_is_let_go_with_its_last_reader() -> None:
+    words = Vocabulary(["oak", "steel"], np.eye(2, dtype=np.float32))
+    assert words.vector("steeel").any()
+    gone = weakref.ref(words)
+    del words
+    gc.collect()
+    assert gone() is None
 
 
 def test_word_vectors_are_unit_and_words_are_sorted(vocabulary: Vocabulary) -> None:

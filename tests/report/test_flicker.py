@@ -4,8 +4,10 @@ import pytest
 
 from stages.report.flicker import flicker
 
+LOOKS = ("oak", "marble", "brick", "rust", "leather", "concrete", "linen", "bark", "fur", "onyx", "brushed iron", "tenmoku")
 
-@pytest.mark.parametrize("look", ["oak", "marble", "brick", "rust", "leather", "concrete", "linen", "bark", "fur", "onyx", "brushed iron", "tenmoku"])
+
+@pytest.mark.parametrize("look", LOOKS)
 def test_textures_of_1024_and_of_4096_texels_give_the_same_colours(look: str) -> None:
     """To 1 %, with the default samples."""
     assert flicker(look, 1 / 32, supersample=2, relief=0.0) <= 0.01
