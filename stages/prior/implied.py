@@ -199,8 +199,9 @@ LISTED = ("cover", "partly", "spots", "inlay", "stud", "streak", "edge")
 """Joins that hold for all that "and" goes on with."""
 
 WEARS = {
-    **dict.fromkeys(("scratches", "scrapes", "scuffs"), "scratched"), "stains": "stained", "cracks": "cracked",
-    **dict.fromkeys(("streaks", "drips", "water stains", "rain streaks", "water streaks", "water marks"), "streaky"),
+    **{name: "scratched" for name, region in SHAPES.items() if region.kind == "scratches"},
+    **{name: "streaky" for name, region in SHAPES.items() if region.kind == "streaks"},
+    **dict.fromkeys(("stains", "stained", "water stains"), "stained"), "cracks": "cracked", "fissures": "cracked",
     **dict.fromkeys(("smudges", "smears"), "dirty"),
 }  # fmt: skip
 """Patterns that are wear where no stuff is named for them."""

@@ -219,6 +219,8 @@ SKINS = ("fabric", "leather", "stone", "ceramic", "plastic")
 def _of_usual(phrase: Phrase, thing: Phrase) -> bool:
     """Whether what a thing is said to have is what it is all made of: "a ship with dark oak planks"."""
     usual = split(OBJECTS[thing.thing].made)[0]
+    if phrase.join.kind == "with" and phrase.substance in GENERIC and phrase.weather and not (phrase.thing or phrase.part):
+        return family(phrase.substance) in ("wood", "stone", "metal")  # "a house with rotten wood"
     if phrase.join.kind != "with" or not (usual.substance and phrase.substance) or gathering(phrase.substance):
         return False
     kin = "wood" in (usual.substance, usual.substance.split(" ")[-1]) and phrase.boards  # "a barn with red boards"

@@ -59,7 +59,7 @@ def _listed(tokens: Sequence[Token], at: int) -> tuple[Palette, int]:
         words = [token.text for token in tokens[at : end + metal]]
         if not any(map(is_hue, words)):
             return [], at
-        palette.append(words)
+        palette += _apart(words)
         end += metal
         if (len(palette) > 1 and tokens[at - 1].text in ("and", "&", "+")) or end == len(tokens):
             return palette, end
@@ -68,6 +68,14 @@ def _listed(tokens: Sequence[Token], at: int) -> tuple[Palette, int]:
         if tokens[end].text not in (",", "and", "&", "/"):
             return [], at
         at = end + 1
+
+
+def _apart(words: list[str]) -> Palette:
+    """Colours that no comma parts: "red white and blue"."""
+    hues = [k for k, word in enumerate(words) if is_hue(word)]
+    if len(hues) < 2:
+        return [words]
+    return [words[(hues[k - 1] + 1 if k else 0) : at + 1] for k, at in enumerate(hues)]
 
 
 def _pattern(token: Token, before: Sequence[Token]) -> Token:

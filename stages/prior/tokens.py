@@ -87,6 +87,7 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     """Each known phrase, the longest first, and each word that none knows. Args: real: words that are no slips of the pen."""
     prompt = re.sub(r"\s[-–—]+\s|[–—]", " , ", prompt)  # "rust - a ship"
     plain = unicodedata.normalize("NFKD", prompt.lower()).encode("ascii", "ignore").decode()
+    plain = re.sub(rf"\b([a-z]{{3,}}[^s\W])s (?=(?:{BELONGINGS})\b)", r"\1's ", plain)
     plain = re.sub(r"(?:\b([a-z]+) )?\b([a-z-]+)(?:'s|(?<=s)') ([a-z-]+(?: [a-z-]+)?)", _owned, plain)
     for simile, meant in SIMILES:
         plain = re.sub(simile, meant, plain)
@@ -133,6 +134,9 @@ def _owned(found: re.Match[str]) -> str:
         return " ".join(filter(None, (before, owner, owned)))
     return " ".join(filter(None, ("" if kinds.get(before, "") in ("substance", "thing") else before, owned)))
 
+
+BELONGINGS = "helmet|sword|shield|hat|crown|armou?r|mask|cloak|robe|staff|boots|chest|axe|hammer|throne|goblet"
+"""What somebody has, whose name people write without an apostrophe: "a knights helmet"."""
 
 LIKENESS = (r"\b(?:that )?(?:looks? |gleams? |shines? |glows? |shimmers? )?like an? ([a-z][a-z -]*?)"
             r"(?=$|[,;.]| and | with | on | but )")
@@ -191,6 +195,8 @@ SIMILES = (
     (r",? half[- ](?:dipped|submerged|buried) in\b", ", lower half"),
     (r"(?:,| with| in)(?: an?)? ((?:light |dark |medium |warm |deep |rich )?)"
      r"(?!coffee|water|blood|rust|grass|oil|wine|ink|tea|dirt)([a-z]+) stain\b", r", \1\2 coloured"),
+    (r"^(?:an? |some )?([a-z ]+?) in an? ((?:[a-z-]+ ){0,3}?)(mug|cup|bowl|tankard|goblet|bucket)\b",
+     r"\2\3 with \1 inside"),
     (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot|holder|saucer|basket)\b",
      r"with a \1\2 at the lower third"),
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
@@ -347,10 +353,18 @@ def _longest(heard: list[str], at: int) -> tuple[Token | None, int]:
         plain = plain_forms(last)
         for spelling in (last, last.replace("-", " "), *singulars(last), f"{last}s", *plain):
             text = " ".join([*before, spelling])
-            for known in (text, text.replace("-", " "), text.replace("-", "")):
+            joined = [text.replace(" ", "")] if length == 2 and _compounds(text, table) else []  # "surf board"
+            for known in (text, text.replace("-", " "), text.replace("-", ""), *joined):
                 if known in table and (spelling not in plain or table[known].kind in COMPARED):
                     return table[known], length
     return None, 1
+
+
+def _compounds(text: str, table: Mapping[str, Token]) -> bool:
+    """Whether two words may be a thing's name that is written as one: neither is a colour, nor a word that joins."""
+    known = [table[word].kind for word in text.split(" ") if word in table]
+    whole = table.get(text.replace(" ", ""))
+    return whole is not None and whole.kind == "thing" and set(known) <= {"thing", "substance", "part", "unknown"}
 
 
 COMPARED = ("color", "finish", "weather", "size", "degree")
@@ -490,6 +504,8 @@ def _resolved(found: list[Token]) -> list[Token]:
                 names = set()  # "an emerald brooch"
             if names or shaped or any(t.kind == "substance" for t in behind):
                 token = token._replace(kind="color", value=None)
+        if token.kind == "finish" and token.text in OBJECTS and not (ahead or behind or result):
+            token = token._replace(kind="thing", value=None)  # "a mirror with a rusty frame"
         placed = bool(ahead) and ahead[0].kind == "part" and ahead[0].text.startswith("on ")  # "cherry on top"
         after = [t.text if t.kind == "join" else t.kind for t in found[number + 1 : number + 3]]
         opens = not result and not ahead and (after[:1] == ["with"] or after == ["comma", "color"])  # "rose, red with"
@@ -541,10 +557,10 @@ def _own_part(token: Token, before: list[Token]) -> Region | None:
     """Where a skin lies of which the thing that was named first has one, as a drum has."""
     thing = next((t.text for t in before if t.kind == "thing"), "")
     places = PARTS_OF.get(thing) or PARTS_OF.get(thing.split(" ")[-1], {})
-    return places.get(token.text) if token.kind in ("substance", "thing") and token.text in OUTSIDES else None
+    return places.get(token.text) if token.kind in ("substance", "thing", "color") and token.text in OUTSIDES else None
 
 
-OUTSIDES = ("flesh", "skin", "hide", "rind", "crust", "shell", "peel", "husk", "horn", "bell")
+OUTSIDES = ("flesh", "skin", "hide", "rind", "crust", "shell", "peel", "husk", "horn", "bell", "rose")
 """Names of stuffs that are parts of things, too."""
 
 
@@ -709,9 +725,18 @@ SERVED = ("tea", "coffee", "wine", "milk", "beer", "water", "sake", "whisky", "e
 
 def _serves(token: Token, ahead: list[Token]) -> bool:
     """Whether a word only says what the vessel that is named next is for."""
+    held = token.kind == "substance" and (token.text in HELD or KNOWN[token.text][0].look in HELD)
+    if held and ahead and ahead[0].text.split(" ")[-1] in VESSELS and KNOWN[token.text][0].look not in PLAITED:
+        return True  # "a sand bucket"
     vessel = bool(ahead) and ahead[0].kind == "thing" and OBJECTS[ahead[0].text].made.split(" ")[-1] in KNOWN
     family = KNOWN[OBJECTS[ahead[0].text].made.split(" ")[-1]][0].family if vessel else ""
     return token.text in SERVED and family in ("ceramic", "metal", "plastic", "wood")
+
+
+VESSELS = ("bucket", "pail", "bin", "jar", "can", "bottle", "tank", "scuttle", "shaker", "dispenser", "mill", "grinder", "jug",
+           "tin", "drum", "barrel", "shovel", "cellar")  # fmt: skip
+PLAITED = ("bark", "leaves", "grass", "seashell", "newspaper")
+"""Things that are for what is named before them, and looks of what may be made of, too."""
 
 
 def _shades(token: Token, after: list[Token]) -> bool:
