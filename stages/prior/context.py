@@ -113,8 +113,8 @@ def _takes_wear(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
             result.append(replace(phrase, substance="", colors=[], finish=[], shows=whole.shows))
             return True  # "a stool painted blue, paint flaking off the seat"
         if phrase.coats and not before.coats:  # "a white fence with flaking paint"
-            painted = not before.substance and bool(_made(before)) and family(_made(before)) == "paint"
-            before.shows = phrase.shows or (None if painted else Phrase(substance=before.substance, thing=before.thing))
+            bare = not before.substance and bool(_made(before)) and family(_made(before)) == "paint"
+            before.shows = phrase.shows or (None if bare else Phrase(substance=before.substance, thing=before.thing))
             if before.metal:  # "a red metal toolbox, the paint chipped"
                 before.substance = "painted metal"
         laid = bool(before.region or gathering(before.substance))  # "with moss around the base and water stains"
