@@ -1,8 +1,10 @@
 """The condition maps for a person or another program: one EXR per view and environment, and a contact sheet."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from stages.core.artifact import write_exr
@@ -19,6 +21,11 @@ SHEET_WHITE = 0.7
 
 SHEET_VIEWS = 2
 """Views on the contact sheet."""
+
+
+def on_sheet(views: int) -> list[int]:
+    """Which of so many views are on the contact sheet, in its order."""
+    return sorted({i * views // SHEET_VIEWS for i in range(SHEET_VIEWS)})
 
 
 def light_images(geometry: Geometry, transport: Transport) -> NDArray[np.float32]:
@@ -44,16 +51,19 @@ def sheet_rows(geometry: Geometry, transports: list[Transport]) -> list[NDArray[
         One (tile, 8 tile, 3) row an environment, encoded for display.
     """
     step = max(1, -(-geometry.mask.shape[0] // SHEET_TILE))
-    mask = geometry.mask[::step, ::step, None]
-    depth = np.where(geometry.mask, geometry.depth, np.nan)
-    near, far = (np.nanmin(depth), np.nanmax(depth)) if geometry.mask.any() else (0.0, 1.0)
-    grey = np.nan_to_num(1 - 0.8 * (depth - near) / max(far - near, 1e-6))[::step, ::step, None] * np.ones(3)
-    normal = (geometry.normal[::step, ::step] * 0.5 + 0.5) * mask
+    shown = np.zeros_like(geometry.mask)
+    shown[::step, ::step] = geometry.mask[::step, ::step]
+    some = torch.from_numpy(shown[geometry.mask])
+    small = replace(geometry, mask=shown[::step, ::step], depth=geometry.depth[::step, ::step])
+    depth = np.where(small.mask, small.depth, np.nan)
+    near, far = (np.nanmin(depth), np.nanmax(depth)) if small.mask.any() else (0.0, 1.0)
+    grey = np.nan_to_num(1 - 0.8 * (depth - near) / max(far - near, 1e-6))[..., None] * np.ones(3)
+    normal = (geometry.normal[::step, ::step] * 0.5 + 0.5) * small.mask[..., None]
     rows = []
     for transport in transports:
-        images = light_images(geometry, transport)
-        bright = np.percentile(images[2][geometry.mask], 95) if geometry.mask.any() else 1.0
-        lights = srgb_encode(images[:, ::step, ::step] * (SHEET_WHITE / max(float(bright), 1e-6)))
+        images = light_images(small, transport[some])
+        bright = np.percentile(images[2][small.mask], 95) if small.mask.any() else 1.0
+        lights = srgb_encode(images * (SHEET_WHITE / max(float(bright), 1e-6)))
         rows.append(np.concatenate([grey, normal, *lights], 1).astype(np.float32))
     return rows
 

@@ -1,7 +1,7 @@
 """The conditions stage: cameras, environments, and the light transport of every view under each of them."""
 
 import shutil
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from torch import Tensor
 from stages.asset.parts import labelled_parts, labels
 from stages.asset.traced import traced_scene
 from stages.conditions.cameras import Cameras, place_cameras
-from stages.conditions.maps import SHEET_VIEWS, sheet_rows, write_maps, write_sheet
+from stages.conditions.maps import on_sheet, sheet_rows, write_maps, write_sheet
 from stages.conditions.options import ConditionsOptions
 from stages.conditions.predict import choose_quality
 from stages.conditions.shards import SHARD, merge, views_of
@@ -123,21 +123,22 @@ def conditions(
         options = replace(options, bounces=options.bounces if between else 0)
         missing = [view for view in mine if not view_is_there(out, view, names, options)]
         made = len(missing)
+        shown: dict[int, Future[list[NDArray]]] = {}
         with ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
-            written = writer.submit(save_survey, out, scene, label, request) if whole else None
+            written: Future | None = writer.submit(save_survey, out, scene, label, request) if whole else None
             for i, view in enumerate(missing):
                 progress("views", len(mine) - made + i, len(mine))
                 traced = trace(view, subject, cameras, lights, quality, options, between)
                 if written:
                     written.result()
-                written = writer.submit(write, out, view, lights, traced, options, request)
+                written = shown[view] = writer.submit(write, out, view, lights, traced, options, request)
             if written:
                 written.result()
         progress("views", len(mine), len(mine))
         if whole and between is not None:
             save_npz(out / BETWEEN, BOUNCES, bounces_arrays(between, subject, quality), request)
         if whole:
-            write_sheet(out, sheet(out, names, options.views))
+            write_sheet(out, sheet(out, names, options.views, {view: rows.result() for view, rows in shown.items()}))
         log |= {"views_made": made, "pixels": options.size**2, "rays": plain_options(quality), "expected_percent": expected}
         log |= {"environments": len(lights), "triangles": len(scene.triangles), "quality": options.quality}
     extra = {
@@ -295,12 +296,13 @@ def trace(
 
 def write(
     out: Path, view: int, lights: list[Environment], traced: View, options: ConditionsOptions, request: Provenance
-) -> None:
-    """The files of one view."""
+) -> list[NDArray]:
+    """Write the files of one view. Returns: its rows of the contact sheet, if it is on that, as its files would give them."""
     mask = traced.geometry.mask
     write_geometry(out, view, traced.geometry)
+    stored = []
     for light, transport in zip(lights, traced.transports, strict=True):
-        write_transport(out, view, light.name, mask, transport)
+        stored.append(write_transport(out, view, light.name, mask, transport))
         if options.maps:
             write_maps(out, view, light.name, traced.geometry, transport)
     if traced.ends is not None:
@@ -309,6 +311,7 @@ def write(
         write_geometry(out, view, traced.smooth, SD)
         for light, maps in zip(lights, traced.maps, strict=True):
             write_light_maps(out, view, light.name, mask, maps, SD)
+    return sheet_rows(traced.geometry, stored) if view in on_sheet(options.views) else []
 
 
 def view_normals(points: GBuffer, c2w: NDArray) -> NDArray[np.float32]:
@@ -396,10 +399,13 @@ def check_finite(transport: Transport, environment: str, view: int, seed: int) -
             )
 
 
-def sheet(out: Path, names: tuple[str, ...], views: int) -> list[NDArray]:
-    """Rows of the contact sheet, read back from the files."""
+def sheet(out: Path, names: tuple[str, ...], views: int, made: dict[int, list[NDArray]]) -> list[NDArray]:
+    """Rows of the contact sheet: of views that were made just now, or read back from the files."""
     rows = []
-    for view in sorted({i * views // SHEET_VIEWS for i in range(SHEET_VIEWS)}):
-        geometry = read_geometry(out, view)
-        rows += sheet_rows(geometry, [read_transport(out, view, name, geometry.mask) for name in names])
+    for view in on_sheet(views):
+        if view in made:
+            rows += made[view]
+        else:
+            geometry = read_geometry(out, view)
+            rows += sheet_rows(geometry, [read_transport(out, view, name, geometry.mask) for name in names])
     return rows

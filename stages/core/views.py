@@ -115,10 +115,12 @@ def light_map_names() -> list[str]:
     return [f"light_m{m}_r{r:g}" for m, r in LIGHT_MAPS]
 
 
-def write_transport(folder: Path, view: int, environment: str, mask: NDArray[np.bool_], transport: Transport) -> None:
-    """Write view_NNN/<environment>.exr; `transport` holds the mask's pixels row by row."""
+def write_transport(
+    folder: Path, view: int, environment: str, mask: NDArray[np.bool_], transport: Transport
+) -> Transport:
+    """Write view_NNN/<environment>.exr; `transport` holds the mask's pixels row by row. Returns: what reading it gives."""
     path = folder / view_folder(view) / f"{environment}.exr"
-    _write_radiance(path, transport_channels(), mask, transport.packed(), plain=1)
+    return Transport.unpack(_write_radiance(path, transport_channels(), mask, transport.packed(), plain=1))
 
 
 def read_transport(
@@ -157,8 +159,11 @@ def _light_map_channels() -> list[str]:
     return [f"{name}.{c}" for name in light_map_names() for c in "RGB"]
 
 
-def _write_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], values: Tensor, plain: int) -> None:
-    """Write radiance, changing it. Args: values: (P, channels), of which the last `plain` are no radiance."""
+def _write_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], values: Tensor, plain: int) -> Tensor:
+    """Write radiance, changing it. Args: values: (P, channels), of which the last `plain` are no radiance.
+
+    Returns: as `_read_radiance`.
+    """
     scaled = values[:, : values.shape[1] - plain]
     largest = float(scaled.max()) if len(scaled) else 0.0
     scale = 2.0 ** max(0, int(np.ceil(np.log2(max(largest, 1.0) / LARGEST_STORED))))
@@ -166,9 +171,20 @@ def _write_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], value
     window = object_window(mask)
     inside = mask[window]
     image = np.zeros((values.shape[1], *inside.shape), np.float16)
-    image[:, inside] = rounded(values, plain).T.contiguous().numpy()
+    stored = rounded(values, plain)
+    image[:, inside] = stored.T.contiguous().numpy()
     channels = dict(zip(names, image, strict=True))
     _write(path, channels, mask.shape, window, {"dreammat_scale": repr(scale)}, quickly=True)
+    return _scaled(stored, scale, plain)
+
+
+def _scaled(stored: Tensor, scale: float, plain: int) -> Tensor:
+    """What half floats of a file stand for. Args: (P, channels)."""
+    if scale == 1.0:
+        return stored
+    values = stored.float()
+    values[:, : values.shape[1] - plain] *= scale
+    return values
 
 
 def rounded(values: Tensor, plain: int) -> Tensor:
@@ -190,11 +206,7 @@ def _read_radiance(path: Path, names: list[str], mask: NDArray[np.bool_], plain:
     values = image.select(names, inside)
     if not np.isfinite(values).all():
         raise ArtifactError(f"{path}: holds values that are not finite; make the conditions again")
-    scale = _scale(path, image)
-    if scale != 1.0:
-        values = values.astype(np.float32)
-        values[:, : values.shape[1] - plain] *= scale
-    return torch.from_numpy(values)
+    return _scaled(torch.from_numpy(values), _scale(path, image), plain)
 
 
 def _scale(path: Path, image: ExrImage) -> float:

@@ -21,8 +21,9 @@ def test_stored_transport_errs_by_less_than_half_a_percent(tmp_path: Path) -> No
     label = np.arange(64, dtype=np.int32).reshape(8, 8) + 2**24 - 64
     write_geometry(tmp_path, 0, Geometry(mask, mask.astype(np.float32), np.zeros((8, 8, 3), np.float32), label))
     assert np.array_equal(read_geometry(tmp_path, 0).label, label)
-    write_transport(tmp_path, 0, "sky", mask, Transport(E, A, B, cosine))
+    told = write_transport(tmp_path, 0, "sky", mask, Transport(E, A, B, cosine))
     found = read_transport(tmp_path, 0, "sky", mask)
+    assert torch.equal(told.packed(), found.packed())
     for stored, exact in ((found.E, E), (found.A, A), (found.B, B)):
         assert float(((stored.float() - exact).abs() / exact).max()) <= 2**-8 + 2**-11
     assert float((found.cosine.float() - cosine).abs().max()) <= 2**-11
