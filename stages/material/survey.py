@@ -316,7 +316,7 @@ def occlusion(
 
 @compiled
 def _to_sky(normal, sample, first, direction):  # type: ignore[no-untyped-def]
-    """Cosine-weighted directions. Args: sample: (R, 2, S), 0 to 1. first: number of the first. direction: (S, R, 3), written."""
+    """Cosine-weighted directions, (S, R, 3), written. Args: sample: (R, 2, S), 0 to 1. first: number of the first."""
     golden = (math.sqrt(5.0) - 1) / 2
     for r in range(len(sample)):
         k = first + r
