@@ -8,7 +8,7 @@ from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import spread
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import BAND, PARTS, PEELS, SHAPES, SHOWS, gathering
+from stages.prior.places import BAND, PARTS, PEELS, SHAPES, SHOWS, Region, gathering
 from stages.prior.stuffs import GENERIC, KNOWN
 from stages.prior.tokens import FOODS, PAINTED, Join
 
@@ -18,6 +18,9 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
     if not phrases:
         return []
     implied(phrases)
+    for phrase in phrases:
+        if phrase.join.kind == "half" and phrase.weather and not (phrase.says_what or phrase.region):
+            phrase.region, phrase.where = Region("right", 0.5), "half"  # "pots, one side mossy"
     if phrases[0].substance in CLEAR and not phrases[0].colors and phrases[1:] and phrases[1].join.kind in ("over", "on"):
         phrases[1].finish += phrases[0].finish or ["glossy"]  # "varnish over oak"
         phrases = [replace(phrases[1], join=FIRST), *phrases[2:]]
@@ -284,7 +287,7 @@ def _wears(before: Phrase, phrase: Phrase) -> bool:
     if phrase.where in WEARS and not phrase.says_what:
         return True
     again = phrase.coats and not phrase.colors and not before.region and (before.coats or bool(before.colors))
-    return again and any(word in SHOWS for word in phrase.weather)
+    return again and any(word in BROKEN for word in phrase.weather)
 
 
 def _paint_of_whole(phrase: Phrase, whole: Phrase) -> bool:

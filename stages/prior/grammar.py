@@ -5,7 +5,6 @@ join them ("with", "covered in", "peeling off"); parts ("sole", "rim") and patte
 no table knows, a dictionary may explain by colours; the rest is kept as unknown. """
 
 from collections.abc import Callable, Container, Mapping, Sequence
-from dataclasses import replace
 from itertools import takewhile
 
 from stages.prior.colors import COLORS
@@ -70,10 +69,16 @@ def split(
             within = starts or (within and token.kind not in ("join", "postfix", "comma", "half"))
             if token.kind in ("join", "postfix", "comma", "half"):
                 continue
-            if token.kind == "part" and len(phrases) == 1 and _told_of_part(tokens[: number + 1]):
-                named = Phrase(size=now.size, thing=now.thing)  # "a bowl gold inside"
-                now = replace(now, join=Join("with"), thing="", size=[])
-                phrases = [named, now]
+            if token.kind == "part" and len(phrases) == 1 and (parted := _told_of_part(tokens[:number])):
+                phrases = [Phrase(amount=now.amount), Phrase(Join("with"), amount=now.amount)]  # "a bowl gold inside"
+                for which, run in zip(phrases, parted, strict=True):
+                    for each in run:
+                        _take(which, each, early=True)
+                now = phrases[-1]
+            if token.kind == "thing" and len(phrases) == 1 and now.placed and now.where in PARTS and not now.thing:
+                now.join = Join("with")  # "a marble top table"
+                phrases = [Phrase(thing=token.text, size=now.size), now]
+                continue
             begins = _begins(token, now) and not (within and _lacks(token, now))
             if begins or _paints_part(token, now, tokens[number + 1 :]):
                 now = Phrase(Join("paint" if token.text in PAINTED else "with"))
@@ -87,7 +92,18 @@ def split(
                 now.region, now.where = Region(join.kind, 0.5), token.text  # "gold above, oak below"
                 continue
             phrases.append(Phrase(join))
-    return understood([p for p in phrases if not p.empty]) or [Phrase()]
+    said = [p for p in phrases if not p.empty]
+    if said and _unnamed(tokens, said):
+        said.insert(0, Phrase())  # "a gizmo with a brass handle"
+        said[1].join = said[1].join if said[1].join != FIRST else Join("with")
+    return understood(said) or [Phrase()]
+
+
+def _unnamed(tokens: Sequence[Token], said: Sequence[Phrase]) -> bool:
+    """Whether a thing that no table knows stands first, and then only parts of it."""
+    head = list(takewhile(lambda token: token.kind not in ("join", "comma", "half", "postfix"), tokens))
+    alone = bool(head) and all(token.kind == "name" for token in head)
+    return alone and all(p.where in PARTS and p.says_what and p.region != PARTS["body"] and not p.thing for p in said)
 
 
 def _join_of(token: Token, now: Phrase, following: Token) -> Join | None:
@@ -183,11 +199,15 @@ def _begins(token: Token, now: Phrase) -> bool:
     return now.placed and (token.kind == "color" or (token.kind == "part" and now.where in PARTS and text in PARTS))
 
 
-def _told_of_part(run: Sequence[Token]) -> bool:
-    """Whether what stands between a thing and a part of it is that of the part."""
-    kinds = [token.kind for token in run if token.kind not in ("size", "name", "unknown")]
-    said = set(kinds[1:-1])
-    return kinds[:1] == ["thing"] and bool(said - {"finish"}) and said <= {"color", "substance", "finish", "weather"}
+def _told_of_part(run: Sequence[Token]) -> tuple[Sequence[Token], Sequence[Token]] | None:
+    """A thing and what is said after it, if anything is, which is that of the part that follows: "a barrel rotten at the
+    bottom"."""
+    at = max((k for k, token in enumerate(run) if token.kind == "thing"), default=len(run))
+    after = [token.kind for token in run[at + 1 :] if token.kind not in ("size", "name", "unknown")]
+    whole = not {"join", "comma", "half", "postfix"} & {token.kind for token in run}
+    plain = whole and set(after) <= {"color", "substance", "finish", "weather"}
+    named = "substance" in after and any(token.kind == "substance" for token in run[:at])
+    return (run[: at + 1], run[at + 1 :]) if set(after) - {"finish"} and plain and not named else None
 
 
 def _paints_part(token: Token, now: Phrase, after: Sequence[Token]) -> bool:

@@ -32,7 +32,8 @@ def _alone(phrases: list[Phrase]) -> None:
     listed = all(p.join.kind == "and" and not p.thing for p in phrases[1:]) and all(p.color_only for p in phrases[:-1])
     if len(phrases) > 1 and listed and last.where in OBJECTS and last.where in PARTS:
         last.thing, last.region, last.where = last.where, None, ""  # "a blue and yellow tartan cushion"
-    thing = next((name for name in (first.where, *singulars(first.where)) if name in OBJECTS), "")
+    names = (first.where, first.where.split(" ")[-1])  # "a hawaiian shirt"
+    thing = next((one for name in names for one in (name, *singulars(name)) if one in OBJECTS), "")
     if not first.says_what and thing and len(phrases) == 1:
         phrases[0] = replace(first, thing=thing, region=None, where="")
 

@@ -24,7 +24,8 @@ def _on_color(phrases: list[Phrase]) -> list[Phrase]:
     bare = bool(first.thing or first.substance) and not (any(map(is_hue, first.colors)) or first.animal or first.region)
     hue = ground.join.kind == "on" and ground.color_only and not ground.region
     badge = marks.region is not None and marks.region.kind == "badge"
-    if bare and hue and (marks.where in SHAPES or badge) and marks.says_what:
+    drawn = bool(marks.thing and marks.colors) and not marks.region  # "a vase, blue dragons on white"
+    if bare and hue and (marks.where in SHAPES or badge or drawn) and marks.says_what:
         return [replace(first, colors=[*ground.colors, *first.colors]), marks, *rest]
     return phrases
 

@@ -7,7 +7,7 @@ from stages.prior.colors import COLORS
 from stages.prior.grammar import split
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
-from stages.prior.places import CLOTHES, DETAILS, PARTS, PARTS_OF, PEELS, PERSONS, SHAPES, Region, gathering
+from stages.prior.places import CLOTHES, DETAILS, PARTS, PEELS, PERSONS, SHAPES, Region, gathering, parts_of
 from stages.prior.stuffs import GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import Join
 
@@ -24,12 +24,23 @@ def ordered(phrases: list[Phrase]) -> Order:
     while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
         base += 1
     upper = [replace(phrase, join=Join(after.join.kind)) for phrase, after in pairwise(phrases[: base + 1])]
-    first, over = phrases[base], [*reversed(upper), *phrases[base + 1 :]]
+    first, over = phrases[base], [*reversed(upper), *_between(phrases[base + 1 :])]
     if upper and upper[0].thing and not (first.thing or first.part) and upper[0].says_stuff:
         first, over[base - 1] = replace(first, thing=upper[0].thing), replace(upper[0], thing="")  # "a vase, glaze over clay"
     for step in STEPS:
         first, over = step(first, over)
     return first, over
+
+
+def _between(phrases: list[Phrase]) -> list[Phrase]:
+    """What is left where pieces are only named to say that something lies between them: "moss between the stones"."""
+    kept: list[Phrase] = []
+    for phrase in phrases:
+        if phrase.join == Join("crevices", True) and kept:
+            kept[-1] = replace(kept[-1], region=kept[-1].region or PARTS["crevices"])
+        else:
+            kept.append(phrase)
+    return kept
 
 
 def _stands(first: Phrase, second: Phrase) -> bool:
@@ -109,6 +120,10 @@ ROOFING = frozenset(["thatch", "thatched", "roof tiles", "shingles", "slate tile
 """What lies on roofs when nobody says where."""
 
 
+def _is_gem(phrase: Phrase) -> bool:
+    return bool(phrase.substance) and family(phrase.substance) == "gem"
+
+
 def _is_all(phrase: Phrase) -> bool:
     return phrase.region is not None and phrase.region.kind == "all"
 
@@ -123,7 +138,7 @@ def _flanked(first: Phrase, over: list[Phrase]) -> Order:
 
 def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     """The body, where one is spoken of, is the base, and what was named first lies on top of it."""
-    whole = [_is_all(p) and p.says_what and not gathering(p.substance) for p in over]
+    whole = [_is_all(p) and p.says_what and not (gathering(p.substance) or p.thing or _is_gem(p)) for p in over]
     at = whole.index(True) if True in whole else None
     if at is None:
         return first, over
@@ -304,7 +319,7 @@ def _bared(first: Phrase, over: list[Phrase]) -> Order:
 def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     """Parts of a thing that has them elsewhere than others. Args: thing: where the first does not name it."""
     name = thing or first.thing or first.substance
-    places = PARTS_OF.get(name) or PARTS_OF.get(name.split(" ")[-1], {})
+    places = parts_of(name)
     for phrase in over:
         for part in (phrase, phrase.within):
             if part and (part.where or part.part or not part.region):

@@ -73,6 +73,11 @@ def _of_things() -> dict[str, dict[str, Region]]:
 PARTS_OF = _of_things()
 """Things whose parts lie elsewhere than those of others."""
 
+def parts_of(thing: str) -> dict[str, Region]:
+    """Where parts lie on a thing that has them elsewhere than others: on a side table as on tables."""
+    return {**PARTS_OF.get(thing.split(" ")[-1], {}), **PARTS_OF.get(thing, {})}
+
+
 MADE = {(part, on): stuff for stuff, on, _, parts in rows("parts_made.tsv") for part in words(parts)}
 """What parts are made of, by their name and what they are on: "soft", "hard" or anything."""
 

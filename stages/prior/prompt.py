@@ -256,6 +256,8 @@ class Reading:
             return Region("up", 0.4)  # "a cake with strawberries on top"
         if gathers and phrase.region and phrase.region.kind == "all":
             return gathers  # "ivy climbing the walls"
+        if phrase.region and phrase.region.kind == "all" and phrase.substance and _family(phrase) == "gem":
+            return PARTS["central gem"]  # "a book with a gem on the cover"
         if phrase.region:
             return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region
         if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS, LIKENED
 from stages.prior.names import FINISHES, FINISHES_METAL
 from stages.prior.objects import OBJECTS, rows, words
-from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, PARTS_OF, SHAPES, WEATHER, WET, WORN, Region
+from stages.prior.places import ANIMALS, FADED, GATHERS, PARTS, SHAPES, WEATHER, WET, WORN, Region, parts_of
 from stages.prior.sizes import TIMES
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF
 
@@ -199,6 +199,11 @@ SIMILES = (
      r"\2\3 with \1 inside"),
     (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot|holder|saucer|basket)\b",
      r"with a \1\2 at the lower third"),
+    (r"\b(?:make|makes|making) (?:it|this|that|them|these) look like an? ", ""),
+    (r"\b(?:left|abandoned|allowed|starting|beginning) to rot\b", "rotten"),
+    (r"\b(?:leaking|oozing|spilling|seeping|bubbling) (?:from|out of|over) (?=the |its )", "at "),
+    (r"\bin (?:bright|vivid|vibrant|many|different|various|mixed|assorted) colou?rs\b", "in rainbow patches"),
+    (r"\btopiary (?=(?!bush|tree|hedge)[a-z])", "green leaves "),
     (r"\b(?:to )?look(?:s|ing)? (?:like|as if|as though) (?:it|they|he|she) (?:is|was|were|are)\b", "of"),
     (r"\b(?:burnt|burned|scorched|charred) and blackened\b", "charred"),
     (r"\bblackened (?=at|on|along|around|near|in)", "charred "),
@@ -556,7 +561,7 @@ def _consists(found: list[Token], number: int) -> bool:
 def _own_part(token: Token, before: list[Token]) -> Region | None:
     """Where a skin lies of which the thing that was named first has one, as a drum has."""
     thing = next((t.text for t in before if t.kind == "thing"), "")
-    places = PARTS_OF.get(thing) or PARTS_OF.get(thing.split(" ")[-1], {})
+    places = parts_of(thing)
     return places.get(token.text) if token.kind in ("substance", "thing", "color") and token.text in OUTSIDES else None
 
 
@@ -704,7 +709,8 @@ def _stands_before(ahead: list[Token], behind: list[Token]) -> bool:
 FOODS = frozenset(["bread", "cheese", "chocolate", "salt", "meat", "honeycomb", "honey"])
 """Looks of what is eaten."""
 
-HELD = FOODS | {"grass", "sand", "fine sand", "soil", "coal", "charcoal", "snow", "ice", "ash", "dust", "gravel", "leaves",
+HELD = FOODS | {"toxic waste", "nuclear waste", "slime", "fuel", "petrol", "gasoline",
+                "grass", "sand", "fine sand", "soil", "coal", "charcoal", "snow", "ice", "ash", "dust", "gravel", "leaves",
                 "bark", "newspaper", "oil", "seashell", "jam", "ink", "water", "coffee beans", "acid", "rice", "red wine",
                 "sugar", "peanut butter", "marmalade", "soy sauce", "mayonnaise", "yogurt", "engine oil",
                 "motor oil"}  # fmt: skip
