@@ -338,6 +338,8 @@ def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
         return False
     bare = before.thing and not (before.substance or before.colors or before.unknown)
     dull = bool(before.substance) and not before.metal
+    if before.metal and before.join is FIRST and before.thing and phrase.color_only and not (before.colors or before.region):
+        return phrase.join.kind == "comma"  # "a steel desk, grey"
     hue = phrase.color_only or (dull and phrase.substance in COLORS and not (phrase.colors or phrase.unknown or phrase.finish))
     whole = not before.region or before.region.kind == "all"
     unsaid = hue and bool(before.substance or before.unknown) and not before.colors and whole

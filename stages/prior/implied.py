@@ -138,6 +138,11 @@ def _stones(phrases: list[Phrase]) -> None:
             named = (name for word in phrase.colors for name in (f"{word} stone", word) if name in KNOWN)
             phrase.substance = next((name for name in named if family(name) in ("gem", "stone")), "")
             phrase.colors = [] if phrase.substance else phrase.colors
+    gem = next((f"{word} stone" for word in first.colors if f"{word} stone" in KNOWN), "")
+    thing = first.thing or (rest[0].thing if rest else "")
+    if thing in JEWELS and gem and rest and rest[0].metal and rest[0].join.kind == "and":
+        first.thing, first.substance, first.colors = thing, rest[0].substance, []  # "a turquoise and silver bracelet"
+        rest[0].substance, rest[0].thing, rest[0].join = gem, "", Join("stud")
     for phrase in rest if first.thing in JEWELS else []:
         if phrase.substance in ("stone", "stones") and phrase.join.kind in ("with", "and", "comma") and not phrase.region:
             phrase.substance = "gem"
@@ -201,8 +206,9 @@ LISTED = ("cover", "partly", "spots", "inlay", "stud", "streak", "edge")
 
 WEARS = {
     **{name: "scratched" for name, region in SHAPES.items() if region.kind == "scratches"},
-    **{name: "streaky" for name, region in SHAPES.items() if region.kind == "streaks"},
-    **dict.fromkeys(("stains", "stained", "water stains"), "stained"), "cracks": "cracked", "fissures": "cracked",
+    **{name: "streaky" for name, region in SHAPES.items() if region.kind == "streaks" and not name.startswith("dripping")},
+    **dict.fromkeys(("stains", "stained", "water stains", "water rings", "ring marks", "coffee rings", "cup rings"), "stained"),
+    **dict.fromkeys(("cracks", "fissures"), "cracked"),
     **dict.fromkeys(("smudges", "smears"), "dirty"),
 }  # fmt: skip
 """Patterns that are wear where no stuff is named for them."""

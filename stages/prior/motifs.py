@@ -161,6 +161,9 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
     if first.animal and not first.substance and bare:
         return [replace(first, substance=after.substance, region=None, where=""), *rest[1:]]  # "zebra striped, in cowhide"
     if first.color_only and after.animal and after.join.kind == "and":
+        if after.where in OBJECTS and not after.thing:
+            after.thing, after.region, after.where = after.where, None, ""  # "a green and brown camo helmet"
+        first.thing, after.thing = first.thing or after.thing, ""
         first.substance = coat_of(after.animal, first.thing)  # "pink and purple leopard print"
     elif first.animal and any(map(is_hue, first.colors)) and after.join.kind == "and" and _hue_or_metal(after):
         coat = first.substance or coat_of(first.animal, first.thing)
@@ -246,7 +249,7 @@ def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
         said = second.substance and (second.colors or same)
         if said and second.where not in PARTS:
             first.substance, first.boards = second.substance, second.boards
-        if number == 0 and second.join.kind == "and" and second.thing and said and not (second.region or second.animal):
+        if number == 0 and second.join.kind == "and" and second.thing and not (second.region or second.animal):
             second.region = SHAPES["patches"]  # "a blue and white enamel mug"
         ground = second.within
         if ground and ground.region and second.join.kind == "and":  # "with a red and white striped awning"

@@ -276,7 +276,7 @@ class Reading:
         if (phrase.part or (stand and phrase.join.beneath)) and phrase.join.kind == "on":
             return PARTS["stand"]  # "a cannon on a wooden carriage"
         drawn = bool(phrase.thing) and (lives(phrase.thing) or phrase.thing == "crane")
-        if drawn and phrase.colors and phrase.join.kind in BESIDE:
+        if drawn and (phrase.colors or phrase.metal) and phrase.join.kind in BESIDE:
             return SHAPES["motifs"]  # "a kimono with gold cranes"
         if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
             return DETAILS
@@ -546,6 +546,7 @@ def _painted(made: Phrase) -> str:
         return made.substance  # no white is anodised
     grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH) and named[0] < WHITE
     tinted = own.family == "wood" or float(np.hypot(*usual[1:])) > GREYISH
+    tinted &= bool(np.hypot(*named[1:]) < VIVID * np.hypot(*usual[1:]))
     same = tinted and float(np.linalg.norm(named - usual)) < SIMILAR and named[1] > -GREYISH / 2  # nor green
     return made.substance if grey or same else "painted wood" if own.family == "wood" else "painted metal"
 
@@ -583,6 +584,9 @@ PELTS = ("fur", "feathers")
 
 DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "chrome"])
 """Metals that take colour as metals."""
+
+VIVID = 1.7
+"""How many times the chroma of a stuff a colour may have that it has of itself."""
 
 GREYISH, WHITE = 0.04, 0.9
 """Chroma and lightness in OKLab below which a colour may be that of a bare metal."""

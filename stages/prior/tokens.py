@@ -199,6 +199,10 @@ SIMILES = (
      r"\2\3 with \1 inside"),
     (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot|holder|saucer|basket)\b",
      r"with a \1\2 at the lower third"),
+    (r"\bon (?:the )?(?:north|south|east|west|shady|sunny|far|near|windward|lee|left or right)(?:ern)? side\b", "on one side"),
+    (r"\b(cobweb|vine|lichen|barnacle)(?:bed|ed|d|by)\b", r"\1 covered"), (r"\bcandy[- ](?=striped)", ""),
+    (r"^(?:an? )?((?:[a-z]+ )*?(?:stone|gem|jewel|diamond|ruby|emerald|sapphire|pearl|opal|amber|jade|crystal)s?) "
+     r"set in(?:to)? (?!the )([a-z ]+?)(?=$|[,.;])", r"\2 with \1 studs"),
     (r"\b(?:make|makes|making) (?:it|this|that|them|these) look like an? ", ""),
     (r"\b(?:left|abandoned|allowed|starting|beginning) to rot\b", "rotten"),
     (r"\b(?:leaking|oozing|spilling|seeping|bubbling) (?:from|out of|over) (?=the |its )", "at "),
@@ -359,7 +363,7 @@ def _longest(heard: list[str], at: int) -> tuple[Token | None, int]:
         for spelling in (last, last.replace("-", " "), *singulars(last), f"{last}s", *plain):
             text = " ".join([*before, spelling])
             joined = [text.replace(" ", "")] if length == 2 and _compounds(text, table) else []  # "surf board"
-            for known in (text, text.replace("-", " "), text.replace("-", ""), *joined):
+            for known in (text, text.replace("-", " "), text.replace("-", ""), text.replace(" ", "-"), *joined):
                 if known in table and (spelling not in plain or table[known].kind in COMPARED):
                     return table[known], length
     return None, 1
@@ -393,7 +397,7 @@ def _respelt(word: str, explained: Container[str], real: Container[str]) -> list
     halves = ((word[:cut], word[cut:]) for cut in range(len(word) - 3, 2, -1))
     for first, second in halves:
         whole = second in ENDINGS or any(one in table for one in (second, *singulars(second)))
-        if whole and second != "red" and _names_stuff(first):
+        if whole and second not in ("red", "bed") and _names_stuff(first):
             return [first, *([] if second in ENDINGS else [second])]
     if any(one in real for one in (word, *singulars(word))):
         return []
@@ -500,6 +504,8 @@ def _resolved(found: list[Token]) -> list[Token]:
         haired = token.kind == "thing" and result and ahead and ahead[0].text in HAIR
         if haired and OBJECTS[token.text].made.split(" with ")[0].endswith("fur"):
             result += _hues_of(token.text)
+            if ahead[0].kind == "part":
+                found[number + 1] = Token("substance", "bristles", KNOWN["bristles"])
             continue  # "a brush of badger hair"
         if token.text in COLORS and token.kind in ("substance", "thing"):
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)
@@ -620,12 +626,16 @@ def _of_its_name(token: Token, before: list[Token], ahead: list[Token], behind: 
     hide = HIDES.get(token.text)
     if hide and ahead and ahead[0].text in ("skin", "hide", "leather") and token.kind in ("thing", "unknown"):
         return token._replace(kind="substance", text=hide, value=KNOWN[hide])  # "white ray skin"
+    made = OBJECTS[ahead[0].text].made if ahead and ahead[0].kind == "thing" else ""
+    if hide and token.kind == "thing" and made.endswith("leather"):
+        return token._replace(kind="substance", text=hide, value=KNOWN[hide])  # "alligator shoes"
     if hide and thing and before and before[-1].text in ("in", "of"):
         return token._replace(kind="substance", text=hide, value=KNOWN[hide])
     if thing and token.text in COLORS and before and (before[-1].text == "in" or named):
         return token._replace(kind="color", value=None)
     bare = not ahead and not any(t.kind in ("substance", "color") for t in before)
     wooden = bare and any(map(_of_wood, before)) and before[-1].text in (",", "in", "of", *FINISH_LOOKS)
+    wooden |= "of" in [t.text for t in before[-2:]] and any(t.kind == "part" for t in before[-4:])  # "a hilt of white ash"
     if token.text in TIMBER and (wooden or _of_timber(token.text, ahead[:2])):
         return Token("substance", f"{token.text} wood")
     return token
