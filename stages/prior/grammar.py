@@ -364,6 +364,8 @@ def _name(phrase: Phrase, text: str) -> None:
         return  # "a plastic shell"
     elif old == "molten" or (old == "lacquer" and family(text) == "metal" and not phrase.colors):
         phrase.substance = text  # "molten gold"
+    elif old in ("verdigris", "patina") and family(text) == "metal":
+        phrase.substance = "verdigris metal"  # "verdigris copper"
     elif family(old) == "rust" and family(text) == "metal":
         return  # "verdigris copper"
     elif old.endswith("plated") or old in ("gilt", "gilded"):

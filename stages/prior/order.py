@@ -7,7 +7,7 @@ from stages.prior.colors import COLORS
 from stages.prior.grammar import split
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
-from stages.prior.places import CLOTHES, DETAILS, PARTS, PEELS, PERSONS, SHAPES, Region, gathering, parts_of
+from stages.prior.places import CLOTHES, DETAILS, JOINED, PARTS, PEELS, PERSONS, SHAPES, Region, gathering, parts_of
 from stages.prior.stuffs import GENERIC, KNOWN, PATTERNED
 from stages.prior.tokens import Join
 
@@ -327,6 +327,9 @@ def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
                 names += [part.join.kind] if part.join.kind not in ("cover", "top", "stripe") else []
                 found = (places.get(word) for name in names if name for word in (name, name.split(" ")[-1]))
                 part.region = next(filter(None, found), part.region)
+            kind = part.join.kind if part else ""
+            if part and not part.region and kind in PARTS and JOINED.get(kind) == PARTS[kind]:
+                part.region, part.where = PARTS[kind], kind  # "an ivory handled dagger"
         pair = phrase is over[0] and phrase.join.kind == "and"  # "in black and red leather"
         if not (phrase.region or pair) and name.split(" ")[-1] in SEATED and _is_cloth(phrase):
             phrase.region, phrase.where = PARTS["upholstery"], "upholstery"  # "a chair with gold legs and pink velvet"

@@ -190,7 +190,7 @@ JOINED = {
     **{part: PARTS[part] for part in ("head", "wings", "eyes", "blade", "lid", "neck", "belly", "back", "feet", "roof", "front",
                                       "tail", "beak", "hair", "horns", "sleeves", "base")},
     "dip": Region("below", 0.5, wear=0.2), "except": PARTS["body"], "crevices": PARTS["crevices"],
-    "ends": Region("sides", 0.15), "stuck": Region("below", 0.3),
+    "ends": Region("sides", 0.15), "stuck": Region("below", 0.3), "toe": PARTS["toe"],
     "shell": PARTS["carapace"], "bottom": PARTS["base"], "legs": PARTS["legs"], "seat": PARTS["seat"],
     "paint": Region("all", 1.0),
 }  # fmt: skip

@@ -92,6 +92,7 @@ def tokens_of(prompt: str, explained: Mapping[str, Sequence[str]], real: Contain
     for simile, meant in SIMILES:
         plain = re.sub(simile, meant, plain)
     plain = re.sub(LIKENESS, _likened, plain)
+    plain = re.sub(WORN_OFF, _worn_off, plain)
     plain = re.sub(r"\b(on|at|along|around|near|over|inside|across) (the|its) ([a-z]+) ([a-z]+)\b", _at_part, plain)
     plain = re.sub(r"(?<![#\w])\d+\w*", " ", plain)  # "4k", "8k", "3d"
     heard = re.findall(r"#[0-9a-f]{6}\b|[a-z]+(?:-[a-z]+)*|[,;.:()/&+]", plain)
@@ -157,6 +158,18 @@ def _at_part(found: re.Match[str]) -> str:
     return f"{at} {the} {part}" if plain and f"{which} {part}" not in _table()[0] else found[0]
 
 
+WORN_OFF = (r"\b([a-z]+) (paint|enamel|lacquer|glaze) (?:peeling|flaking|chipping|chipped|worn|rubbed|scraped|coming) "
+            r"(?:away )?off the ([a-z]+)\b")
+
+
+def _worn_off(found: re.Match[str]) -> str:
+    """A coat that is gone from a part only: "white paint worn off the armrests"."""
+    hue, coat, part = found.groups()
+    known = _table()[0].get(part)
+    place = known is not None and known.kind == "part" and known.value.kind not in ("all", "edges", "crevices")
+    return f"{hue} {coat}, chipped at the {part}" if place and hue in COLORS else found[0]
+
+
 ARTICLES = {"a": "a", "an": "a", "the": "the"}
 
 TURNED = (r"((?:sun-?|rain-?|smoke-?|age-?)?(?:weathered|greyed|grayed|aged|bleached|darkened|yellowed|seasoned|silvered|"
@@ -199,6 +212,12 @@ SIMILES = (
      r"\2\3 with \1 inside"),
     (r"\bin an? ((?:[a-z-]+ ){0,3}?)(pot|planter|plant pot|flower pot|flowerpot|holder|saucer|basket)\b",
      r"with a \1\2 at the lower third"),
+    (r"\b(iron|steel|brass|bronze|copper|silver|gold|metal|rope|cord|twine)[- ]bound\b", r"\1 banded"),
+    (r"\bpaint-(chipped|peeling|flaking|worn)\b", r"\1 painted"),
+    (r"^((?:an? )?(?:(?!high|with|and)[a-z-]+ ){1,4})heels\b", r"\1high heels"),
+    (r"\bblack[- ]figure(?: greek)? ([a-z]+)(?!.*figures)", r"\1 of orange clay with black figures"),
+    (r"\bred[- ]figure(?: greek)? ([a-z]+)(?!.*figures)", r"\1 of black clay with orange figures"),
+    (r"\b(?:stone|acid)[- ]?washed (?=jeans|denim|jacket)", "faded "),
     (r"\bon (?:the )?(?:north|south|east|west|shady|sunny|far|near|windward|lee|left or right)(?:ern)? side\b", "on one side"),
     (r"\b(cobweb|vine|lichen|barnacle)(?:bed|ed|d|by)\b", r"\1 covered"), (r"\bcandy[- ](?=striped)", ""),
     (r"^(?:an? )?((?:[a-z]+ )*?(?:stone|gem|jewel|diamond|ruby|emerald|sapphire|pearl|opal|amber|jade|crystal)s?) "
@@ -497,6 +516,10 @@ def _resolved(found: list[Token]) -> list[Token]:
             continue  # "a mailbox in robin egg blue"
         if token.kind in ("substance", "thing") and _shades(token, found[number + 1 :]):
             continue  # "candy apple red paint"
+        if token.kind == "thing" and token.text in YOUNG and result and result[-1].kind == "thing":
+            continue  # "a golden retriever puppy"
+        if token.text == "crust" and token.kind == "substance" and not any(map(_is_food, found[:number])):
+            token = Token("substance", "mineral crust", KNOWN["mineral crust"])  # "a meteorite with a black crust"
         if token.kind == "substance" and KNOWN[token.text][0].family == "wood" and ahead and ahead[0].text in TREES:
             continue  # "a birch tree"
         if _holds(token, result, found[number + 1 :]) or _serves(token, ahead):
@@ -519,7 +542,9 @@ def _resolved(found: list[Token]) -> list[Token]:
             token = token._replace(kind="thing", value=None)  # "a mirror with a rusty frame"
         placed = bool(ahead) and ahead[0].kind == "part" and ahead[0].text.startswith("on ")  # "cherry on top"
         after = [t.text if t.kind == "join" else t.kind for t in found[number + 1 : number + 3]]
-        opens = not result and not ahead and (after[:1] == ["with"] or after == ["comma", "color"])  # "rose, red with"
+        told = found[number + 2].text in LENT if number + 2 < len(found) else False
+        opens = after[:1] == ["with"] or after == ["comma", "color"] or (after[:1] == ["comma"] and told)  # "rose, red with"
+        opens &= not result and not ahead
         if token.kind == "color" and token.text in OBJECTS and not behind and (placed or opens):
             token = token._replace(kind="thing", value=None)
         named = token.article or (any(t.article for t in behind) and any(t.text in COMMON for t in behind))
@@ -582,6 +607,16 @@ def _depicts(token: Token, before: list[Token]) -> bool:
     at = next((k for k, t in enumerate(before) if t.kind == "thing"), len(before))
     named = (t.kind in ("thing", "unknown") or t.text in ("on", "with", "and", "of") for t in before[at:])
     return len(before) > at + 1 and all(named)
+
+
+YOUNG = ("puppy", "pup", "kitten", "cub", "foal", "calf", "lamb", "chick")
+"""Beasts that are of the kind that is named before them."""
+
+
+def _is_food(token: Token) -> bool:
+    """Whether a token is of what is eaten."""
+    made = OBJECTS[token.text].made.split(" with ")[0].split(" ")[-1] if token.kind == "thing" else token.text
+    return made in KNOWN and KNOWN[made][0].look in FOODS
 
 
 TREES = ("tree", "trees", "forest", "sapling", "hedge", "bush", "grove", "woodland")
@@ -708,6 +743,9 @@ def _is_stuff(token: Token, ahead: list[Token], behind: list[Token]) -> bool:
     names = {t.kind for t in ahead} & {"substance", "thing"}
     if names:
         return _stands_before(ahead, behind)
+    kind = KNOWN[token.text][0].family if token.text != "cane" else "stick"
+    if any(t.kind == "substance" and t.text in GENERIC and KNOWN[t.text][0].family != kind for t in behind):
+        return False  # "a wooden cane"
     return bool(ahead or behind) or " with " not in OBJECTS[token.text].made  # "a strawberry" has seeds
 
 
@@ -806,6 +844,7 @@ def _table() -> tuple[dict[str, Token], int]:
     aside = [place for place, region in PARTS.items() if region.kind == "sides"]
     for side in ("left", "right"):
         enter("part", {f"{side} {place}": Region(side, 0.5 * PARTS[place].share) for place in aside})
+    enter("part", {"on one half": Region("right", 0.5), "on the other half": Region("left", 0.5)})
     enter("part", {"on one side": Region("right", 0.4), "on the other side": Region("left", 0.4)})
     enter("aside", ASIDE)
     enter("half", ("half", "half of it", "the other half", "other half", "one half", "one side", "the other side", "and half"))
