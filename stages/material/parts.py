@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from stages.material.recipe import Mask
 from stages.material.surface import Surface
-from stages.material.tops import TOPS, level_part
+from stages.material.tops import BACKS, TOPS, backrest, level_part
 
 LEGS = ("leg", "legs", "foot", "feet")
 HANDLES = ("handle", "handles", "grip", "hilt", "haft", "shaft", "wrapping", "wrap", "wraps", "binding")
@@ -25,7 +25,7 @@ SMALL = (
     "buckle", "buckles", "clasp", "clasps", "button", "buttons", "knob", "knobs", "rivet", "rivets", "stud", "studs", "screws",
     "bolts", "nails", "eyelets", "grommets", "eye", "eyes", "hinges", "fittings", "hardware", "latch", "lock", "padlock",
 )  # fmt: skip
-SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS, *WHEELS, *SMALL, *TOPS)
+SHAPED = (*LEGS, *HANDLES, *HEADS, *SPOUTS, *GUARDS, *POMMELS, *ENDS, *WHEELS, *SMALL, *TOPS, "backrest")
 """Names of parts that are looked for in the shape of a thing."""
 
 SAMPLED, NEAR = 3000, 160
@@ -62,6 +62,8 @@ def found(mask: Mask, surface: Surface) -> Mask | None:
         return None
     if word in TOPS and mask.kind == "up":
         return level_part(mask, surface)
+    if mask.said.endswith(BACKS) and mask.kind == "above":
+        return backrest(mask, surface)
     if word in LEGS:
         return _thin_pieces(mask, surface) or _under(mask, surface)
     if word in WHEELS:

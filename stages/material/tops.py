@@ -1,4 +1,4 @@
-"""Where people sit, and what they put things on: the seat of a chair, the top of a table, by what lies level on a mesh."""
+"""Where people sit and lean, and what they put things on: seat and back of a chair, the top of a table, by what lies level."""
 
 from dataclasses import replace
 
@@ -9,7 +9,10 @@ from stages.material.recipe import Mask
 from stages.material.surface import Surface
 
 TOPS = ("seat", "seats", "cushion", "cushions", "pad", "tabletop", "desktop", "countertop", "worktop", "benchtop")
-"""Names of parts that lie level. """
+"""Names of parts that lie level."""
+
+BACKS = ("backrest", "back rest", "seat back")
+"""Names of what one leans on."""
 
 FACING, FLAT, OPEN = 0.7, 0.9, 0.95
 """Least cosine to the vertical of what lies level, of a point and in the mean; most that the object may hide of its sky."""
@@ -37,12 +40,48 @@ MOST = 0.8
 """Share of the surface that a seat has at most."""
 
 
+TALL, LEAST_BACK = 0.85, 0.2
+"""How far up a backrest reaches; how much of the height is above the seat at least, and how far below it the back may begin,
+which stands behind it."""
+
+
 def level_part(mask: Mask, surface: Surface) -> Mask | None:
     """The mask of what lies level and widest, settled: pieces of their own, or what faces up about one height; None where no
     level part is wide.
 
     Args: surface: evenly spread points, some thousands.
     """
+    level = _level(surface)
+    if level is None:
+        return None
+    z, height = surface.point[level, 2], float(np.ptp(surface.point[:, 2]))
+    pieces = _pieces(surface, level, height)
+    if pieces and np.isin(surface.piece, pieces).mean() < MOST:
+        return replace(mask, kind="pieces", pieces=pieces, level=0.5)
+    bottom, top = (float(v) for v in np.quantile(z, (0.01, 0.99)))
+    half = 0.5 * (top - bottom) + 0.01 * height
+    return replace(mask, kind="level", axis=(0.0, 0.0, 0.5 * (top + bottom)), level=-half)
+
+
+def backrest(mask: Mask, surface: Surface) -> Mask | None:
+    """The mask of what rises from a seat to the top, settled: pieces of their own, or all above the seat; None where nothing
+    rises above what lies level. Args: as of `level_part`."""
+    level = _level(surface)
+    if level is None:
+        return None
+    z, seat = surface.point[:, 2], float(np.median(surface.point[level, 2]))
+    low, height = float(z.min()), float(np.ptp(z))
+    if seat > low + (1 - LEAST_BACK) * height:
+        return None
+    rows = [(int(k), z[surface.piece == k]) for k in np.unique(surface.piece)]
+    backs = tuple(k for k, own in rows if own.max() > low + TALL * height and own.min() > seat - LEAST_BACK * height)
+    if backs:
+        return replace(mask, kind="pieces", pieces=backs, level=0.5)
+    return replace(mask, kind="above", level=seat + RIM * height)
+
+
+def _level(surface: Surface) -> NDArray[np.bool_] | None:
+    """Which points lie level at the height at which most of the floor plan does; None where too little does."""
     z = surface.point[:, 2]
     low, height = float(z.min()), float(np.ptp(z))
     flat = (surface.normal[:, 2] > FACING) & (surface.occlusion < OPEN) & (z > low + LOWEST * height)
@@ -51,18 +90,10 @@ def level_part(mask: Mask, surface: Surface) -> Mask | None:
     cell = np.unique(np.floor(surface.point[:, :2] / CELL).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
     starts = low + height * np.arange(LOWEST, 1.0, 0.02)
     plans = [len(np.unique(cell[flat & (z >= start) & (z <= start + DEEP * height)])) for start in starts]
-    if max(plans) < LEAST_PLAN * (cell.max() + 1):
-        return None
     start = starts[np.flatnonzero(np.array(plans) >= NEARLY * max(plans))[-1]]  # what lies under the seat is none of it
     level = flat & (z >= start) & (z <= start + DEEP * height)
-    if surface.normal[level, 2].mean() < FLAT:
-        return None
-    pieces = _pieces(surface, level, height)
-    if pieces and np.isin(surface.piece, pieces).mean() < MOST:
-        return replace(mask, kind="pieces", pieces=pieces, level=0.5)
-    bottom, top = (float(v) for v in np.quantile(z[level], (0.01, 0.99)))
-    half = 0.5 * (top - bottom) + 0.01 * height
-    return replace(mask, kind="level", axis=(0.0, 0.0, 0.5 * (top + bottom)), level=-half)
+    wide = max(plans) >= LEAST_PLAN * (cell.max() + 1)
+    return level if wide and surface.normal[level, 2].mean() >= FLAT else None
 
 
 def _pieces(surface: Surface, level: NDArray[np.bool_], height: float) -> tuple[int, ...]:

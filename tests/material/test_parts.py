@@ -198,3 +198,15 @@ def test_what_has_no_level_part_wears_its_seat_where_it_faces_up() -> None:
     round_ = surface((0.5 * ball, ball))
     up = covered(round_, "seat", region="up") > 0.5
     assert up.mean() == pytest.approx(0.3, abs=0.02) and ball[up, 2].min() > ball[~up, 2].max() - 1e-3
+
+
+@pytest.mark.parametrize("word", ["backrest", "seat back"])
+def test_a_backrest_rises_from_the_seat(word: str) -> None:
+    panel = box((-0.32, -0.3, 0.05), (-0.28, 0.3, 0.5))
+    chair = surface(*CHAIR[:5], *ARMS, panel, apart=True)
+    assert ((covered(chair, word, region="above") > 0.5) == (chair.piece == 8)).all()
+    whole = surface(*CHAIR[:5], panel)
+    assert ((covered(whole, word, region="above") > 0.5) == (whole.point[:, 2] > 0.05)).mean() > 0.99
+    stool = surface(*CHAIR[:5], apart=True)
+    low = covered(stool, word, region="above") > 0.5
+    assert (low == (stool.point[:, 2] > -0.5 + 0.5 * 0.7)).mean() > 0.95  # where words alone put it: the highest 30 %
