@@ -4,13 +4,14 @@ from dataclasses import replace
 
 from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.implied import WEARS, implied
+from stages.prior.lexicon import PAINTED, Join
 from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import spread
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
 from stages.prior.places import BAND, PARTS, PEELS, SHAPES, SHOWS, Region, gathering
+from stages.prior.senses import FOODS
 from stages.prior.stuffs import GENERIC, KNOWN
-from stages.prior.tokens import FOODS, PAINTED, Join
 
 
 def understood(phrases: list[Phrase]) -> list[Phrase]:

@@ -10,13 +10,14 @@ from itertools import takewhile
 from stages.prior.colors import COLORS
 from stages.prior.context import understood
 from stages.prior.implied import CHECKS, PLAIN_PATTERNS
+from stages.prior.lexicon import PAINTED, Join, Token
 from stages.prior.motifs import CLOTHS, PAINTS
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import gathered
 from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
 from stages.prior.places import BAND, CLOTHES, DETAILS, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import BOARDS, GENERIC, KNOWN, PATTERNED
-from stages.prior.tokens import PAINTED, Join, Token, tokens_of
+from stages.prior.tokens import tokens_of
 
 
 def split(

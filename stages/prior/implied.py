@@ -4,11 +4,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 from stages.prior.colors import CHANGES
+from stages.prior.lexicon import Join, singulars
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family, is_hue
 from stages.prior.places import GATHERS, HEADED, OWN, PARTS, SHAPES, Region, gathering
 from stages.prior.stuffs import KNOWN, ROOFS
-from stages.prior.tokens import Join, singulars
 
 
 def implied(phrases: list[Phrase]) -> None:

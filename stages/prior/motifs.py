@@ -4,11 +4,11 @@ from dataclasses import replace
 from itertools import pairwise
 
 from stages.prior.colors import COLORS
+from stages.prior.lexicon import Join
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
 from stages.prior.places import ANIMALS, PARTS, PRINTED, SHAPES, SHELLED, Region
 from stages.prior.stuffs import KNOWN
-from stages.prior.tokens import Join
 
 
 def grounded(phrases: list[Phrase]) -> list[Phrase]:

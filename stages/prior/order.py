@@ -5,11 +5,11 @@ from itertools import pairwise
 
 from stages.prior.colors import COLORS
 from stages.prior.grammar import split
+from stages.prior.lexicon import Join
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family
 from stages.prior.places import CLOTHES, DETAILS, JOINED, PARTS, PEELS, PERSONS, SHAPES, Region, gathering, parts_of
 from stages.prior.stuffs import GENERIC, KNOWN, PATTERNED
-from stages.prior.tokens import Join
 
 Order = tuple[Phrase, list[Phrase]]
 """The base, and what lies over it, from below."""

@@ -3,11 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from stages.prior.lexicon import Join, Token
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import Phrase, family, is_hue
 from stages.prior.places import JOINED, SHAPES, Region
+from stages.prior.senses import LENT
 from stages.prior.stuffs import KNOWN
-from stages.prior.tokens import LENT, Join, Token
 
 Palette = list[list[str]]
 """Colours, each in the words that make it up."""

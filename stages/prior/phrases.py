@@ -4,10 +4,10 @@ from collections.abc import Container
 from dataclasses import dataclass, field
 
 from stages.prior.colors import COLORS
+from stages.prior.lexicon import Join
 from stages.prior.objects import OBJECTS
 from stages.prior.places import Region
 from stages.prior.stuffs import COATINGS, KNOWN
-from stages.prior.tokens import Join
 
 FIRST = Join("")
 """Before what nothing stands."""

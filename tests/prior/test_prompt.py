@@ -14,13 +14,13 @@ from stages.material.substances import ALONG_GRAIN, LOOKS, METRES
 from stages.prior.colors import rgb
 from stages.prior.explain import HEADINGS, explained, parts, table
 from stages.prior.grammar import split
+from stages.prior.lexicon import JOINS, POSTFIX
 from stages.prior.model import Prior, load_prior
 from stages.prior.names import SUBSTANCES
 from stages.prior.objects import OBJECTS
 from stages.prior.places import ANIMALS, GATHERS, JOINED, ONCE, PARTS, SHAPES, WEATHER
 from stages.prior.prompt import Reading, read_prompt
 from stages.prior.stuffs import FAMILY_LOOKS, FINISH_LOOKS, KNOWN, LOOK_OF, look_of
-from stages.prior.tokens import JOINS, POSTFIX
 from stages.report.measures import color_difference
 from stages.report.prompts import PROMPTS
 from tests.prior.prompts import CORPUS, FORMS, WORDS, parsed
