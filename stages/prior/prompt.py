@@ -6,37 +6,30 @@ same tables and explains other words by a dictionary, and look like the substanc
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import cache
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from stages.core.color import srgb_decode, srgb_encode
 from stages.material.evaluate import means
 from stages.material.library import Library
-from stages.material.look import from_oklab, to_oklab
 from stages.material.recipe import Coat, Layer, Mask, Part, Recipe
 from stages.material.substances import LOOKS, METRES
-from stages.prior.colors import CHANGES, COLORS, LEANINGS, TREATMENTS, changed, rgb
+from stages.prior.colors import COLORS, TREATMENTS, rgb
 from stages.prior.grammar import split
 from stages.prior.implied import BURNT
 from stages.prior.motifs import coat_of
-from stages.prior.names import FINISHES, FINISHES_METAL
+from stages.prior.names import FINISHES_METAL
 from stages.prior.objects import OBJECTS
-from stages.prior.order import ROOFING, in_its_places, ordered
-from stages.prior.phrases import LIVING, Phrase, is_hue, lives
+from stages.prior.order import in_its_places, ordered
+from stages.prior.phrases import Phrase, is_hue, lives
 from stages.prior.places import (
     ANIMALS,
     CORRODES,
     DETAILS,
     FADE,
     FADED,
-    GATHERS,
-    GROWN,
     JOINED,
     LAYERED,
-    MADE,
-    PARTS,
     PEELED,
     PEELS,
     POROUS,
@@ -53,41 +46,41 @@ from stages.prior.places import (
     gathering,
 )  # fmt: skip
 from stages.prior.primer import primed
-from stages.prior.sizes import LEAST, MOST, TIMES, measured
-from stages.prior.stuffs import (
-    BOARDS,
-    FINISH_LOOKS,
-    GENERIC,
-    KNOWN,
-    LOOK_OF,
-    PAINTABLE,
-    PATTERNED,
-    Stuff,
-    boards_of,
-    look_of,
-    stuff,
+from stages.prior.regions import BESIDE, place_of, scaled, strands
+from stages.prior.shades import (
+    GAUDY,
+    color_of,
+    corroded,
+    described,
+    drawn_on,
+    encoded,
+    faded,
+    family_of,
+    family_of_look,
+    gaudy,
+    greenish,
+    kin,
+    painted,
+    roughness_of,
+    said_of,
+    stuff_of_part,
+    triple,
+    weathers_of,
+    worn,
 )
+from stages.prior.sizes import LEAST, MOST, TIMES, measured
+from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN, LOOK_OF, Stuff, boards_of, look_of, stuff
 from stages.prior.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-RGB = tuple[float, float, float]
 
 ALIKE = 0.55
 """Least cosine of two meanings for an unknown word to be taken for a substance at all."""
 
-SIMILAR = 0.2
-"""Distance in OKLab within which a named colour describes a stuff's own."""
-
-BESIDE = ("with", "over", "and", "comma", "on")
-"""Joins that leave open where a phrase lies."""
-
 STAIN = re.compile("stain|splat|spat|splash|smear")
 """Words of wear that leave most of a part as it is."""
-
-STRIPS = ("below", "above", "front", "back", "left", "right", "middle")
-"""Places that are as high or wide as their word says, however much lies there: "lots of rust near the bottom"."""
 
 UNSAID = "plaster"
 """What a thing is taken to be made of where neither words nor tables say."""
@@ -154,7 +147,7 @@ class Reading:
         if len(made) > 1 and base.colors in ([], made[0].colors):
             inner, over = in_its_places(*ordered(made), base.thing)
             inner = replace(inner, weather=[*inner.weather, *base.weather], finish=base.finish or inner.finish)
-            coat = replace(self._coat(inner), said=f"{base.thing}: {_said(inner)}")
+            coat = replace(self._coat(inner), said=f"{base.thing}: {said_of(inner)}")
             patterned = any(region and region.kind in PATTERNS for region in said)
             usual = [p for p in over if p.region not in said and not (patterned and p.where in SHAPES)]
             parts = [layer for part in usual for layer in self._over(part, coat, inner)]
@@ -168,10 +161,10 @@ class Reading:
         if base.animal:
             ground, marks, region = ANIMALS[base.animal]
             if not base.colors:
-                layers = [Layer(replace(coat, color=_triple(rgb(ground))))]
+                layers = [Layer(replace(coat, color=triple(rgb(ground))))]
             for k, mark in enumerate(marks.split()):
-                marked = replace(coat, color=_triple(rgb(mark)), said=f"{base.animal} marks")
-                layers.append(Layer(marked, (_scaled(region, 0.7**k).mask(base.animal),)))
+                marked = replace(coat, color=triple(rgb(mark)), said=f"{base.animal} marks")
+                layers.append(Layer(marked, (scaled(region, 0.7**k).mask(base.animal),)))
         return [*layers, *self._weather(base)]
 
     def _over(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
@@ -192,12 +185,12 @@ class Reading:
             return [Layer(coat, (WHOLE,), 2e-4), *self._weather(phrase, (WHOLE,), beneath)]  # "with scratched red paint"
         if phrase.animal:
             _, marks, region = ANIMALS[phrase.animal]
-            mark = _color(phrase) if phrase.colors else _triple(rgb(marks.split()[0]))
-            marked = replace(beneath, color=mark, said=_said(phrase))
+            mark = color_of(phrase) if phrase.colors else triple(rgb(marks.split()[0]))
+            marked = replace(beneath, color=mark, said=said_of(phrase))
             if phrase.region and phrase.where and phrase.where not in SHAPES:  # "a rifle with a camouflage stock"
                 return self._printed(phrase, beneath)
             return [Layer(marked, (region.mask(phrase.animal),))]
-        mask = self._region(phrase).mask(phrase.where or phrase.part)
+        mask = place_of(phrase).mask(phrase.where or phrase.part)
         if phrase.within and phrase.within.region:
             part = phrase.within.region.mask(phrase.within.where)
             whole = phrase.join.kind == "cover" and not gathering(phrase.substance)
@@ -216,11 +209,11 @@ class Reading:
         place = phrase.region.mask(phrase.where)
         coat = self._of(stuff(phrase.substance, False), phrase) if phrase.substance else beneath
         coat = self._of(stuff("paint", False), phrase) if (coat.metallic or 0.0) > 0.5 else coat
-        color = _color(phrase) if phrase.colors else _triple(rgb(ground))
-        layers = [Layer(replace(coat, color=color, said=_said(phrase)), (place,))]
+        color = color_of(phrase) if phrase.colors else triple(rgb(ground))
+        layers = [Layer(replace(coat, color=color, said=said_of(phrase)), (place,))]
         for k, mark in enumerate(marks.split()):
-            marked = replace(coat, color=_triple(rgb(mark)), said=f"{phrase.animal} marks")
-            layers.append(Layer(marked, (place, _scaled(region, 0.7**k).mask(phrase.animal))))
+            marked = replace(coat, color=triple(rgb(mark)), said=f"{phrase.animal} marks")
+            layers.append(Layer(marked, (place, scaled(region, 0.7**k).mask(phrase.animal))))
         return layers
 
     def _more(self, phrase: Phrase, beneath: Coat, base: Phrase) -> list[Layer]:
@@ -229,11 +222,11 @@ class Reading:
         layers = []
         if phrase.finish:
             metal = (beneath.metallic or 0.0) > 0.5
-            rough = _roughness(phrase, metal) or beneath.roughness
+            rough = roughness_of(phrase, metal) or beneath.roughness
             glass = "mirror-like" in phrase.finish and not metal  # "a cabinet with a mirrored door"
-            coat = self._named("silvered glass") if glass else replace(beneath, roughness=rough, said=_said(phrase))
+            coat = self._named("silvered glass") if glass else replace(beneath, roughness=rough, said=said_of(phrase))
             layers = [Layer(coat, (where,))]
-        for word in _weathers(phrase):
+        for word in weathers_of(phrase):
             weather = WEATHER[word]
             coat = self._named(weather.stuff) if weather.stuff else self._beneath(base, None)
             drawn = STAIN.search(word) or weather.region.kind in ("veins", "scratches") or word in PEELS
@@ -242,45 +235,6 @@ class Reading:
             layers.append(Layer(coat, (replace(where, wear=1.0), *stains), weather.thickness, weather.strength))
         return layers
 
-    def _region(self, phrase: Phrase) -> Region:
-        """Where a phrase lies."""
-        region = self._whole_region(phrase)
-        return region if phrase.region and region.kind in STRIPS else _scaled(region, phrase.much)
-
-    def _whole_region(self, phrase: Phrase) -> Region:
-        gathers = GATHERS.get(gathering(phrase.substance))
-        if gathers and phrase.where in ("on top", "on the top", "on top of it"):
-            return Region("up", min(0.45, gathers.share) if gathers.kind == "up" else 0.45, gathers.size, gathers.wear)
-        cut = bool(phrase.substance) and _family(phrase) in ("organic", "wood")
-        if phrase.where in ("on top", "on the top") and cut and not gathers:
-            return Region("up", 0.4)  # "a cake with strawberries on top"
-        if gathers and phrase.region and phrase.region.kind == "all":
-            return gathers  # "ivy climbing the walls"
-        if phrase.region and phrase.region.kind == "all" and phrase.substance and _family(phrase) == "gem":
-            return PARTS["central gem"]  # "a book with a gem on the cover"
-        if phrase.region:
-            return phrase.region._replace(wear=max(phrase.region.wear, 0.7 * gathers.wear)) if gathers else phrase.region
-        if gathers and phrase.join.kind in ("with", "on", "cover", "over", "and", "comma", "cap", "top"):
-            covers = phrase.join.kind in ("cover", "over")
-            return gathers._replace(share=max(gathers.share, 0.65)) if covers and gathers.kind != "up" else gathers
-        grown = GROWN.get(phrase.substance.split(" ")[-1])
-        if grown and phrase.join.kind in BESIDE and not phrase.part:
-            return grown
-        if strands(phrase) and phrase.join.kind in ("cover", *BESIDE):
-            return SHAPES["bands"]._replace(share=0.5, size=0.06) if phrase.within else SHAPES["bands"]._replace(share=0.15)
-        if phrase.substance and _family(phrase) == "gem" and phrase.join.kind in BESIDE and not phrase.part:
-            return SHAPES["studs"]
-        if phrase.substance in ROOFING and phrase.join.kind in ("", *BESIDE):
-            return PARTS["roof"]
-        stand = phrase.thing or phrase.boards or phrase.substance in PATTERNED
-        if (phrase.part or (stand and phrase.join.beneath)) and phrase.join.kind == "on":
-            return PARTS["stand"]  # "a cannon on a wooden carriage"
-        drawn = bool(phrase.thing) and (lives(phrase.thing) or phrase.thing == "crane")
-        if drawn and (phrase.colors or phrase.metal) and phrase.join.kind in BESIDE:
-            return SHAPES["motifs"]  # "a kimono with gold cranes"
-        if (phrase.part or phrase.thing) and phrase.join.kind in BESIDE:
-            return DETAILS
-        return JOINED.get(phrase.join.kind, JOINED["with"])
 
     def _coat(self, phrase: Phrase, beneath: Coat | None = None) -> Coat:
         """The substance of a phrase, with the colour and finish that it asks for."""
@@ -289,50 +243,51 @@ class Reading:
             phrase = replace(phrase, unknown=[])  # "a deere tractor"
         if phrase.unknown and (not phrase.substance or phrase.substance in GENERIC):
             return self._unknown(phrase)
-        if phrase.substance and _family(phrase) == "wood" and BURNT & set(phrase.weather) and not phrase.amount_of(BURNT):
+        if phrase.substance and family_of(phrase) == "wood" and BURNT & set(phrase.weather) and not phrase.amount_of(BURNT):
             rest = [word for word in phrase.weather if word not in BURNT]
             coal = self._coat(replace(phrase, substance="charred wood", weather=rest))
             return replace(coal, said=f"charred {phrase.substance}")
         if phrase.substance:
             usual = split(made)[0] if made else Phrase()
-            if not phrase.colors and _kin(phrase, usual):  # "a plastic traffic cone"
+            if not phrase.colors and kin(phrase, usual):  # "a plastic traffic cone"
                 phrase = replace(phrase, colors=usual.colors)
-            named = GAUDY.get(phrase.substance, phrase.substance) if _gaudy(phrase) else phrase.substance
-            if CORRODES.get(KNOWN[named][0].look) == "verdigris" and _greenish(phrase):
+            named = GAUDY.get(phrase.substance, phrase.substance) if gaudy(phrase) else phrase.substance
+            if CORRODES.get(KNOWN[named][0].look) == "verdigris" and greenish(phrase):
                 named, phrase = "verdigris", replace(phrase, colors=[])  # "copper gone green"
             return self._of(stuff(named, any(map(is_hue, phrase.colors))), phrase)
-        if of_part := _stuff_of_part(phrase, beneath):
+        if of_part := stuff_of_part(phrase, beneath):
             return self._of(stuff(of_part, True), phrase)
         horny = phrase.animal in SHELLED and not beneath and not (phrase.thing and lives(phrase.thing))
-        if made and not horny and not (phrase.colors and beneath is not None and _drawn(split(made)[0], beneath)):
+        if made and not horny and not (phrase.colors and beneath is not None and drawn_on(split(made)[0], beneath)):
             inner = split(made)[0]
             inner.colors, inner.finish = phrase.colors or inner.colors, phrase.finish or inner.finish
             inner.weather, inner.region, inner.where = phrase.weather, None, ""
-            inner.substance = _painted(inner) if phrase.colors else inner.substance
-            if not inner.colors and RUSTED & set(phrase.weather) and _family(inner) in ("wood", "stone", "ceramic", "plastic"):
+            inner.substance = painted(inner) if phrase.colors else inner.substance
+            rusts = bool(RUSTED & set(phrase.weather)) and not inner.colors
+            if rusts and family_of(inner) in ("wood", "stone", "ceramic", "plastic"):
                 inner.substance = "iron"  # "a rusty chair"
             if inner.substance == "painted metal" and any(word in FINISHES_METAL for word in inner.finish):
                 inner.substance = "paint"
-            return replace(self._coat(inner), said=f"{_said(phrase)}: {_said(inner)}" if phrase.thing else _said(inner))
+            return replace(self._coat(inner), said=f"{said_of(phrase)}: {said_of(inner)}" if phrase.thing else said_of(inner))
         if phrase.colors and BURNT & set(phrase.weather) and phrase.region:
             return self._of(stuff("charcoal", True), replace(phrase, weather=[]))  # "charred black at the legs"
         if beneath is not None and phrase.colors:  # of the same stuff
-            kind = self._region(phrase).kind
+            kind = place_of(phrase).kind
             made_of = CORRODES.get(beneath.look.split(" ")[-1]) if beneath.metallic else ""
             stained = kind in ("streaks", "patches", "crevices") and phrase.color_only
-            if made_of == "verdigris" and stained and _greenish(phrase):
+            if made_of == "verdigris" and stained and greenish(phrase):
                 return self._named("verdigris")  # "a copper still with green streaks"
-            raw = _family_of(beneath.look) in ("metal", "rust", "wood", "stone") and beneath.look not in ("straw", "wicker")
+            raw = family_of_look(beneath.look) in ("metal", "rust", "wood", "stone") and beneath.look not in ("straw", "wicker")
             shade = not any(word in COLORS or word.startswith("#") for word in phrase.colors)  # darker than its own
             coated = beneath.metallic or (raw and kind not in ("veins", "spots", "patches"))
             look = "paint" if coated and not shade else beneath.look
             metallic = 0.0 if look == "paint" else beneath.metallic
-            rough = _roughness(phrase, bool(metallic)) or (0.35 if look == "paint" else beneath.roughness)
+            rough = roughness_of(phrase, bool(metallic)) or (0.35 if look == "paint" else beneath.roughness)
             look = look_of(stuff("paint", True), available=self._looks) if look == "paint" else look
-            return replace(beneath, color=_color(phrase), look=look, metallic=metallic, roughness=rough, said=_said(phrase))
+            return replace(beneath, color=color_of(phrase), look=look, metallic=metallic, roughness=rough, said=said_of(phrase))
         if phrase.animal:
             return self._of(stuff(coat_of(phrase.animal, phrase.thing), False), phrase)
-        weathers = [WEATHER[word].stuff for word in _weathers(phrase) if WEATHER[word].stuff]
+        weathers = [WEATHER[word].stuff for word in weathers_of(phrase) if WEATHER[word].stuff]
         name = "paint" if phrase.colors else weathers[0] if weathers else UNSAID
         if weathers and not phrase.colors:
             phrase.weather = []  # "rusty" alone is rust
@@ -342,23 +297,23 @@ class Reading:
         """A stuff as a phrase wants it. Args: name: what people call it, in place of the table's."""
         if wanted.family == "wood" and SILVERED & set(phrase.weather) and not any(map(is_hue, phrase.colors)):
             grey = KNOWN["weathered wood"][0]
-            color = _triple((1 - SILVER) * np.array(wanted.color) + SILVER * np.array(grey.color))
+            color = triple((1 - SILVER) * np.array(wanted.color) + SILVER * np.array(grey.color))
             wanted = wanted._replace(look=grey.look, color=color, roughness=max(wanted.roughness, grey.roughness))
         wanted = boards_of(wanted) if phrase.boards else wanted
-        roughness = _roughness(phrase, bool(wanted.metallic)) or wanted.roughness
+        roughness = roughness_of(phrase, bool(wanted.metallic)) or wanted.roughness
         for word in phrase.weather:
             roughness *= WET.get(word, 1.0)
-        named = _color(phrase, wanted.color)
+        named = color_of(phrase, wanted.color)
         treated = any(word in TREATMENTS for word in phrase.colors)
-        color = _faded(np.array(named if treated else _described(wanted, named)), phrase)
+        color = faded(np.array(named if treated else described(wanted, named)), phrase)
         if wanted.roughness > POROUS and not wanted.metallic and any(word in SOAKED for word in phrase.weather):
-            color = _triple(np.array(color) * SOAK)
+            color = triple(np.array(color) * SOAK)
         look = look_of(wanted, phrase.finish, self._looks)
         metallic = wanted.metallic
         hue = any(word in COLORS or word.startswith("#") for word in phrase.colors)
         if metallic and hue and wanted.look != "brushed aluminium":
-            color = _triple(0.6 * np.array(_color(phrase)) + 0.4 * np.array(_color(phrase)) * np.array(wanted.color))
-        coat = Coat(look, color, float(roughness), metallic, said=f"{name} {_said(phrase)}".strip())
+            color = triple(0.6 * np.array(color_of(phrase)) + 0.4 * np.array(color_of(phrase)) * np.array(wanted.color))
+        coat = Coat(look, color, float(roughness), metallic, said=f"{name} {said_of(phrase)}".strip())
         return self._sized(self._scanned(coat, wanted, phrase))
 
     def _scanned(self, coat: Coat, wanted: Stuff, phrase: Phrase) -> Coat:
@@ -374,8 +329,8 @@ class Reading:
         look = self._library.use(found)
         mean = means(look)
         named = any(map(is_hue, phrase.colors)) or any(word in COLORS for word in phrase.substance.split())
-        color = coat.color if named else _encoded(mean.lab)
-        rough = coat.roughness if _roughness(phrase, bool(wanted.metallic)) else mean.roughness
+        color = coat.color if named else encoded(mean.lab)
+        rough = coat.roughness if roughness_of(phrase, bool(wanted.metallic)) else mean.roughness
         metal = None if {"metallic", "packed"} & set(found.maps) else coat.metallic
         return replace(coat, look=look, color=color, roughness=rough, metallic=metal)
 
@@ -389,7 +344,7 @@ class Reading:
         words = " ".join([*phrase.finish, *phrase.colors, *phrase.unknown, phrase.substance]).strip()
         *color, roughness, metallic = self._prior.read([words])[0].tolist()
         near = stuff(self._nearest(phrase, metallic > 0.5), False)
-        means = {"color": _triple(np.array(color)), "roughness": roughness, "metallic": float(metallic > 0.5)}
+        means = {"color": triple(np.array(color)), "roughness": roughness, "metallic": float(metallic > 0.5)}
         return self._of(near._replace(look=own or near.look, paintable=True, **means), phrase)
 
     def _kind_of(self, word: str) -> str:
@@ -434,12 +389,12 @@ class Reading:
     def _weather(self, phrase: Phrase, where: tuple[Mask, ...] = (), under: Coat | None = None) -> list[Layer]:
         """What words of wear and weather lay over a phrase's coat. Args: under: what shows where it is worn, if known."""
         layers = []
-        for word in _weathers(phrase):
+        for word in weathers_of(phrase):
             weather = WEATHER[word]
-            coat = self._named(_corroded(weather.stuff, phrase)) if weather.stuff else self._beneath(phrase, under)
+            coat = self._named(corroded(weather.stuff, phrase)) if weather.stuff else self._beneath(phrase, under)
             if word == "marbled" and coat.color is not None:
-                coat = replace(coat, color=_triple(np.array(coat.color) + MARBLING * (1 - np.array(coat.color))))
-            mask = _scaled(weather.region, phrase.amount.get(word, 1.0)).mask(word)
+                coat = replace(coat, color=triple(np.array(coat.color) + MARBLING * (1 - np.array(coat.color))))
+            mask = scaled(weather.region, phrase.amount.get(word, 1.0)).mask(word)
             if not weather.stuff and phrase.shows and phrase.shows.region:
                 mask = phrase.shows.region.mask(phrase.shows.where)
             layers.append(Layer(coat, (*where, mask), weather.thickness, weather.strength))
@@ -468,44 +423,10 @@ class Reading:
             wooden = "wood" in phrase.substance + made.substance or own.look == "painted wood"
             grey = any(word in FADED for word in phrase.weather)
             return self._named(("weathered wood" if grey else "pine") if wooden else "steel")
-        return _worn(own)
+        return worn(own)
 
     def _sized(self, coat: Coat) -> Coat:
         return replace(coat, metres=self._metres or METRES.get(coat.look, 1.0))
-
-
-def _stuff_of_part(phrase: Phrase, beneath: Coat | None) -> str:
-    """What a part is made of of which words name the colour alone, or "". Args: beneath: what it is on, None for a whole."""
-    said = phrase.where or phrase.part or (phrase.thing if beneath is not None else "")
-    straw = beneath is not None and beneath.look in ("straw", "wicker", "bristles")
-    soft = straw or (beneath is not None and _family_of(beneath.look) in ("organic", "fabric", "leather", "metal", "ice"))
-    hard = beneath is not None and _family_of(beneath.look) in ("metal", "wood", "stone", "ceramic", "paint", "gem")
-    cloth = beneath is not None and _family_of(beneath.look) in ("fabric", "leather")
-    beast = beneath is not None and beneath.look in PELTS
-    sorts = ["", *(name for name, is_it in zip(SORTS, (straw, beast, soft, hard, cloth), strict=True) if is_it)]
-    found = (MADE.get((name, sort), "") for name in (said, said.split(" ")[-1]) for sort in sorts)
-    return next(filter(None, found), "") if phrase.colors else ""
-
-
-SORTS = ("straw", "beast", "soft", "hard", "cloth")
-"""What parts are on that are of other stuffs there, as parts_made.tsv has it."""
-
-
-def _kin(phrase: Phrase, usual: Phrase) -> bool:
-    """Whether a thing of the stuff of a phrase has the colour that it usually has."""
-    if not usual.substance or usual.substance == phrase.substance:
-        return bool(usual.substance)
-    pelt = KNOWN[usual.substance][0].look == KNOWN[phrase.substance][0].look in PELTS
-    return _family(usual) == _family(phrase) != "stone" and (pelt or phrase.substance in GENERIC)
-
-
-def _drawn(made: Phrase, beneath: Coat) -> bool:
-    """Whether what is named on a thing, with its colour, is not of its own stuff there: the keys of a toy, cranes on silk."""
-    kind = KNOWN[made.substance][0].family if made.substance else ""
-    alive = bool(made.substance) and KNOWN[made.substance][0].look in LIVING
-    cloth = kind == "paint" and _family_of(beneath.look) == "fabric"
-    return cloth or kind in ("metal", "stone", "gem") or (alive and _family_of(beneath.look) != "organic")
-
 
 
 def _ground(phrase: Phrase, layers: list[Layer]) -> Coat | None:
@@ -518,78 +439,8 @@ def _ground(phrase: Phrase, layers: list[Layer]) -> Coat | None:
 PATTERNS = ("stripes", "bands", "checks", "zigzag", "gingham", "dots")
 """Kinds of patterns of which a thing has one: its usual is not there where words tell of another."""
 
-
-def strands(phrase: Phrase) -> bool:
-    """Whether a phrase is of something long and thin, which lies around a thing."""
-    return phrase.substance.split(" ")[-1] in STRANDS
-
-
 RUSTED = frozenset(["rusty", "rusted", "rusting"])
 """Words that say that what they tell of is of iron."""
-
-STRANDS = ("ribbon", "ribbons", "cord", "cords", "rope", "ropes", "string", "twine", "strips")
-
-
-def _scaled(region: Region, much: float) -> Region:
-    """A region that covers less or more than usual."""
-    return region if much == 1 else region._replace(share=min(0.9, region.share * much))
-
-
-def _painted(made: Phrase) -> str:
-    """What a thing is made of where words name its colour: wood and iron are painted, but for those of their own colour."""
-    own = KNOWN[made.substance][0] if made.substance else None
-    if not own or own.paintable or own.family not in ("wood", "metal"):
-        return made.substance
-    hues = [word for word in made.colors if word in COLORS or word.startswith("#")]
-    named, usual = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (_color(made), own.color))
-    if not hues or (made.substance in DYED_METALS and named[0] < WHITE):
-        return made.substance  # no white is anodised
-    grey = own.family == "metal" and bool(np.hypot(*named[1:]) < GREYISH) and named[0] < WHITE
-    tinted = own.family == "wood" or float(np.hypot(*usual[1:])) > GREYISH
-    tinted &= bool(np.hypot(*named[1:]) < VIVID * np.hypot(*usual[1:]))
-    same = tinted and float(np.linalg.norm(named - usual)) < SIMILAR and named[1] > -GREYISH / 2  # nor green
-    return made.substance if grey or same else "painted wood" if own.family == "wood" else "painted metal"
-
-
-WOODEN = ("wood", "wooden", "timber")
-"""Wood of any kind, which is painted where words give it a colour that no wood has."""
-
-
-PLAIN_METALS = ("metal", "steel", "iron", "tin", "sheet metal")
-"""Metals that are painted where words give them a colour that no metal has: "a red metal toolbox"."""
-
-
-GAUDY = {**dict.fromkeys(WOODEN, "painted wood"), **dict.fromkeys(PLAIN_METALS, "painted metal")}
-"""What they are then."""
-
-
-def _gaudy(phrase: Phrase) -> bool:
-    """Whether a phrase's colour is one that neither wood nor iron has of itself: green, blue, red."""
-    if not any(word in COLORS or word.startswith("#") for word in phrase.colors):
-        return False
-    _, *chroma = to_oklab(srgb_decode(np.array(_color(phrase)))[:, None])[:, 0]
-    return bool(np.hypot(*chroma) > GREYISH and (chroma[1] < 0.6 * np.hypot(*chroma)))
-
-
-def _greenish(phrase: Phrase) -> bool:
-    """Whether a phrase's colour is green or turquoise."""
-    if not any(map(is_hue, phrase.colors)):
-        return False
-    red, green, blue = _color(phrase)
-    return green > 1.15 * red and green > 0.85 * blue
-
-
-PELTS = ("fur", "feathers")
-"""Looks whose colour is that of the beast: a bear of faux fur is as brown as one of fur."""
-
-DYED_METALS = frozenset(["aluminium", "aluminum", "brushed aluminium", "chrome"])
-"""Metals that take colour as metals."""
-
-VIVID = 1.7
-"""How many times the chroma of a stuff a colour may have that it has of itself."""
-
-GREYISH, WHITE = 0.04, 0.9
-"""Chroma and lightness in OKLab below which a colour may be that of a bare metal."""
 
 
 def _usual_size(phrases: list[Phrase]) -> float | None:
@@ -617,100 +468,3 @@ MATT = 0.65
 
 SILVERED, SILVER = frozenset(["weathered", "sun-bleached"]), 0.6
 """Words that say of bare wood that sun and rain have turned it grey, and how far."""
-
-
-def _corroded(name: str, phrase: Phrase) -> str:
-    """What weather leaves on a phrase's stuff: rust on iron, verdigris on copper."""
-    if name == "rust" and phrase.substance and KNOWN[phrase.substance][0].look == "verdigris":
-        return "verdigris"
-    if name not in ("rust", "verdigris") or not phrase.substance or not KNOWN[phrase.substance][0].metallic:
-        return name
-    return CORRODES.get(KNOWN[phrase.substance][0].look.split(" ")[-1], name)
-
-
-def _weathers(phrase: Phrase) -> list[str]:
-    """The words of weather of a phrase from below, one for each thing that weather does."""
-    told: dict[tuple[str, str], str] = {}
-    charred = bool(phrase.substance) and _family(phrase) == "wood" and not phrase.amount_of(BURNT)
-    for word, weather in WEATHER.items():
-        if word in phrase.weather and not (charred and word in BURNT):
-            told.setdefault((weather.stuff, weather.region.kind), word)
-    if sum(place == "crevices" for _, place in told) > 1:
-        told.pop(("grime", "crevices"), None)  # what else lies in crevices hides it
-    return list(told.values())
-
-
-def _color(phrase: Phrase, own: RGB | None = None) -> RGB:
-    """sRGB of a phrase's colour words: those that name colours mixed, or the stuff's own, changed by those that change one."""
-    base = [
-        rgb(COLORS.get(w, w)) if w in COLORS or w.startswith("#") else np.array(KNOWN[w][0].color)
-        for w in phrase.colors if is_hue(w)
-    ]  # fmt: skip
-    color = np.mean(base, 0) if base else np.array((0.5, 0.5, 0.5) if own is None else own)
-    for word in (*LEANINGS, *CHANGES):
-        if word in phrase.colors:
-            color = changed(color, word)
-    return _triple(color)
-
-
-def _described(wanted: Stuff, named: RGB) -> RGB:
-    """A named colour as this stuff has it: "green moss" is moss."""
-    if wanted.paintable or wanted.metallic or wanted.look in PAINTABLE or wanted.family in ("fabric", "leather"):
-        return named
-    own, other = (to_oklab(srgb_decode(np.array(c))[:, None])[:, 0] for c in (wanted.color, named))
-    one, two = np.hypot(*own[1:]), np.hypot(*other[1:])
-    plain = two < GREYISH / 2 < one or one < GREYISH < two - 2 * GREYISH  # grey moss, and yellow porcelain
-    if float(np.linalg.norm(own - other)) > SIMILAR or plain:
-        return named
-    return _triple(np.array(wanted.color) + 0.3 * (np.array(named) - np.array(wanted.color)))
-
-
-def _roughness(phrase: Phrase, metal: bool) -> float | None:
-    """What words of finish say, if any does."""
-    table = {**FINISHES, **FINISHES_METAL} if metal else {**FINISHES_METAL, **FINISHES}
-    found = [sum(table[word]) / 2 for word in phrase.finish if word in table]
-    return float(np.mean(found)) if found else None
-
-
-@cache
-def _family_of(look: str) -> str:
-    """The family of the stuffs that have a look, or one of its finishes."""
-    found = (s.family for stuffs in KNOWN.values() for s in stuffs if look in (s.look, s.look.split(" ")[-1]))
-    return next(found, "metal" if look.split(" ")[0] in FINISH_LOOKS else "")
-
-
-def _family(phrase: Phrase) -> str:
-    return KNOWN[phrase.substance][0].family
-
-
-def _worn(coat: Coat) -> Coat:
-    """A coat where it is worn: metal is polished, all else is lighter and rougher."""
-    rough = coat.roughness or 0.5
-    if (coat.metallic or 0.0) > 0.5:
-        return replace(coat, roughness=max(0.12, 0.55 * rough), said=f"bare {coat.said}")
-    color = None if coat.color is None else _triple(np.array(coat.color) + 0.2 * (1 - np.array(coat.color)))
-    return replace(coat, color=color, roughness=min(1.0, rough + 0.15), said=f"worn {coat.said}")
-
-
-def _faded(color: np.ndarray, phrase: Phrase) -> RGB:
-    keep = float(np.prod([FADED.get(word, 1.0) for word in phrase.weather]))
-    pale = np.mean(color) + keep * (np.asarray(color) - np.mean(color))
-    return _triple(pale + 0.5 * (1 - keep) * (1 - pale))
-
-
-def _encoded(lab: np.ndarray) -> RGB:
-    """sRGB of OKLab."""
-    return _triple(srgb_encode(from_oklab(lab[:, None])[:, 0]))
-
-
-def _triple(color: np.ndarray) -> RGB:
-    red, green, blue = np.clip(color, 0, 1).tolist()
-    return red, green, blue
-
-
-def _said(phrase: Phrase) -> str:
-    """A phrase in few words."""
-    boards = ["boards"] if phrase.boards and phrase.substance not in BOARDS else []
-    name = phrase.substance or phrase.animal or phrase.thing
-    finish = [word for word in phrase.finish if word not in name.split(" ")]
-    return " ".join([*finish, *phrase.colors, *phrase.unknown, name, *boards]).strip()

@@ -1,6 +1,5 @@
 """What says in a roundabout way what an adjective says, as patterns and what they mean."""
 
-
 from stages.prior.colors import COMMON
 
 TURNED = (r"((?:sun-?|rain-?|smoke-?|age-?)?(?:weathered|greyed|grayed|aged|bleached|darkened|yellowed|seasoned|silvered|"
