@@ -9,7 +9,7 @@ from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import spread
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import BAND, PARTS, PEELS, SHAPES, SHOWS, Region, gathering
+from stages.prior.places import BAND, PARTS, PEELS, SHAPES, SHOWS, Region, gathering, parts_of
 from stages.prior.senses import FOODS
 from stages.prior.stuffs import GENERIC, KNOWN
 
@@ -32,7 +32,9 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
         after = phrases[number + 1] if number + 1 < len(phrases) else None
         if not before and phrase.where in ALONE and after and after.join.kind == "comma" and after.color_only:
             phrase.region, phrase.where = None, ""  # "quartz countertop, white"
-        if phrase.substance in PAINTED and phrase.join.kind == "comma" and not phrase.region:
+        lies = after is not None and after.join.beneath
+        painted = phrase.substance in PAINTED or (number == 1 and not lies and _is_paint(phrase, before))
+        if painted and phrase.join.kind == "comma" and not phrase.region:
             phrase.join = Join("paint")
         if after and not before and after.join.kind == "comma" and not (phrase.says_what or phrase.region):
             after.join = phrase.join  # "matte, dark red paint"
@@ -54,6 +56,13 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
                 phrase.within = before
             result.append(phrase)
     return spread(in_pairs(_laid(result)))
+
+
+def _is_paint(phrase: Phrase, before: Phrase | None) -> bool:
+    """Whether a phrase is all the paint of a thing of whose stuff was told: "a steel girder, red oxide primer"."""
+    bare = before is not None and bool(before.substance) and not (gathering(before.substance) or before.coats or before.region)
+    paint = phrase.coats and family(phrase.substance) == "paint" and not (phrase.thing or phrase.part or phrase.weather)
+    return bare and paint and phrase.much == 1
 
 
 def _takes_paint(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
@@ -335,7 +344,7 @@ def _describes(before: Phrase, phrase: Phrase, after: Phrase | None) -> bool:
     if after and after.join.kind in ("on", "over") and after.substance and phrase.coats and set(phrase.weather) & PEELS:
         return False  # "a chair, peeling white paint on grey wood"
     paired = after and after.region and after.join.kind == "and" and after.where not in PARTS
-    if phrase.region or phrase.thing or phrase.part or paired:
+    if phrase.region or phrase.thing or phrase.part or paired or phrase.substance in parts_of(before.thing):
         return False
     bare = before.thing and not (before.substance or before.colors or before.unknown)
     dull = bool(before.substance) and not before.metal

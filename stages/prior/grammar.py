@@ -268,7 +268,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
     elif kind == "part" and text.startswith("around") and phrase.where in ("trim", "edging", "border", "outline"):
         return  # "gold trim around the visor"
     elif kind == "part" and text.startswith(RINGED) and phrase.where in RINGS:
-        region = token.value if token.value.share < BAND or token.value.kind == "middle" else token.value._replace(share=BAND)
+        region = token.value._replace(share=min(token.value.share, 2 * BAND if token.value.kind == "middle" else BAND))
         phrase.region, phrase.where, phrase.placed = region, text, phrase.says_what  # "a gold ring around the top"
     elif kind == "part" and phrase.where in SHAPES and _laid_on(phrase):
         phrase.within, phrase.placed = Phrase(phrase.join, region=token.value, where=text), True  # "studs around the rim"

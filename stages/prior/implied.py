@@ -46,8 +46,9 @@ def _patterned(phrases: list[Phrase]) -> None:
     if plain and first.region and alone:
         phrases.insert(1, Phrase(Join("with"), colors=["dark"], region=first.region, where=first.where))
         first.region, first.where = None, ""
-    for phrase in rest:
-        bare = phrase.join.kind in ("with", "comma") and not (phrase.says_what or phrase.weather or phrase.finish)
+    for phrase, after in zip(rest, [*rest[1:], Phrase()], strict=False):
+        told = after.color_only and after.join.kind == "comma"  # "with a striped sail, red and white"
+        bare = not told and phrase.join.kind in ("with", "comma") and not (phrase.says_what or phrase.weather or phrase.finish)
         if bare and not phrase.colors and phrase.where in (*PLAIN_PATTERNS, *CHECKS):
             phrase.colors = ["black" if phrase.where in CHECKS else "dark"]  # "with checkers on the side"
 
@@ -138,9 +139,13 @@ def _stones(phrases: list[Phrase]) -> None:
             named = (name for word in phrase.colors for name in (f"{word} stone", word) if name in KNOWN)
             phrase.substance = next((name for name in named if family(name) in ("gem", "stone")), "")
             phrase.colors = [] if phrase.substance else phrase.colors
-    gem = next((f"{word} stone" for word in first.colors if f"{word} stone" in KNOWN), "")
+    named = (name for word in first.colors for name in (f"{word} stone", word) if name in KNOWN)
+    gem = next((name for name in named if family(name) == "gem"), "")
     thing = first.thing or (rest[0].thing if rest else "")
-    if thing in JEWELS and gem and rest and rest[0].metal and rest[0].join.kind == "and":
+    if thing in JEWELS and gem and first.metal:
+        first.colors = []  # "an emerald ring in yellow gold"
+        phrases.insert(1, Phrase(Join("stud"), gem))
+    elif thing in JEWELS and gem and rest and rest[0].metal and rest[0].join.kind == "and":
         first.thing, first.substance, first.colors = thing, rest[0].substance, []  # "a turquoise and silver bracelet"
         rest[0].substance, rest[0].thing, rest[0].join = gem, "", Join("stud")
     for phrase in rest if first.thing in JEWELS else []:

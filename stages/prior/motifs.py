@@ -13,7 +13,7 @@ from stages.prior.stuffs import KNOWN
 
 def grounded(phrases: list[Phrase]) -> list[Phrase]:
     """The phrases, each pattern after its ground."""
-    return _grounded(_marked(_checked(_painted(_on_color(phrases)))))
+    return _grounded(_marked(_checked(_painted(_on_color(_told_later(phrases))))))
 
 
 def _on_color(phrases: list[Phrase]) -> list[Phrase]:
@@ -40,6 +40,7 @@ def _painted(phrases: list[Phrase]) -> list[Phrase]:
 
 PAINTS = {
     "kintsugi": ("gold", [""]), "graffiti": ("spray paint", ["blue", "red", "yellow"]),
+    "puddles": ("water", [""]), "puddle": ("water", [""]),
     "sprinkles": ("glossy plastic", ["red", "yellow", "blue"]),
 }
 """Patterns that say of what they are, and of which colours where nobody says."""
@@ -68,6 +69,17 @@ PARTICIPLES = ("striped", "banded", "checked", "chequered", "checkered", "quarte
 
 CLOTHS = {"gingham": "red", "houndstooth": "black", "argyle": "green", "tattersall": "brown", "buffalo check": "red"}
 """Checks that are of cloth, and of which colour where nobody says."""
+
+
+def _told_later(phrases: list[Phrase]) -> list[Phrase]:
+    """Two colours of a pattern on a part may be told after it: "with a striped sail, red and white"."""
+    for number, (marks, one, other) in enumerate(zip(phrases, phrases[1:], phrases[2:], strict=False)):
+        pair = _hue_alone(one) and one.join.kind == "comma" and _hue_alone(other) and other.join.kind == "and"
+        if pair and marks.within and marks.where in SHAPES and not any(map(is_hue, marks.colors)):
+            ground = Phrase(marks.join, colors=one.colors, region=marks.within.region, where=marks.within.where)
+            told = replace(marks, join=Join("with"), colors=other.colors, within=ground)
+            return [*phrases[:number], ground, told, *phrases[number + 3 :]]
+    return phrases
 
 
 def _checked(phrases: list[Phrase]) -> list[Phrase]:

@@ -322,7 +322,7 @@ def in_its_places(first: Phrase, over: list[Phrase], thing: str = "") -> Order:
     places = parts_of(name)
     for phrase in over:
         for part in (phrase, phrase.within):
-            if part and (part.where or part.part or not part.region):
+            if part and (part.where or part.part or not part.region) and part.join.kind != "inlay":
                 names = [part.where or part.part] if part.where or part.part else [part.thing, part.substance]
                 names += [part.join.kind] if part.join.kind not in ("cover", "top", "stripe") else []
                 found = (places.get(word) for name in names if name for word in (name, name.split(" ")[-1]))

@@ -6,7 +6,7 @@ from itertools import takewhile
 from stages.prior.colors import CHANGES, COLORS, COMMON, LEANINGS
 from stages.prior.lexicon import PAINTED, Token, longest_known
 from stages.prior.objects import OBJECTS
-from stages.prior.places import PARTS, SHAPES, WORN, Region, parts_of
+from stages.prior.places import PARTS, SHAPES, WEATHER, WORN, Region, parts_of
 from stages.prior.stuffs import FINISH_LOOKS, GENERIC, KNOWN
 
 
@@ -41,6 +41,8 @@ def resolved(found: list[Token]) -> list[Token]:
             continue  # "a birch tree"
         if _holds(token, result, found[number + 1 :]) or _serves(token, ahead):
             continue  # "a tin biscuit box", "a tea bowl"
+        if token.text == "frosted" and ahead and ahead[0].kind == "thing" and _of_growth(ahead[0]):
+            token = Token("weather", "frosty", WEATHER["frosty"])  # "a frosted pine cone"
         haired = token.kind == "thing" and result and ahead and ahead[0].text in HAIR
         if haired and OBJECTS[token.text].made.split(" with ")[0].endswith("fur"):
             result += hues_of(token.text)
@@ -128,6 +130,12 @@ def _depicts(token: Token, before: list[Token]) -> bool:
 
 YOUNG = ("puppy", "pup", "kitten", "cub", "foal", "calf", "lamb", "chick")
 """Beasts that are of the kind that is named before them."""
+
+
+def _of_growth(token: Token) -> bool:
+    """Whether a thing is of what grows, on which frost is ice."""
+    made = OBJECTS[token.text].made.split(" with ")[0].split(" ")[-1]
+    return made in KNOWN and KNOWN[made][0].family in ("wood", "organic", "stone") and KNOWN[made][0].look not in FOODS
 
 
 def _is_food(token: Token) -> bool:
@@ -246,8 +254,12 @@ BEARERS = ("turtle", "tortoise", "sea turtle", "snail", "crab", "lobster", "beet
 def _opens(token: Token, before: list[Token]) -> bool:
     """Whether a token ends the first run, which an article opens."""
     whole = [*before, token]
-    opened = whole[0].article == "a" or not before
+    opened = whole[0].article == "a" or len(before) < LONE
     return opened and all(t.kind in ("color", "finish", "weather", "size", "substance") for t in before)
+
+
+LONE = 2
+"""Words before a ring from which on an article tells that it is a thing."""
 
 
 def _is_jewel(token: Token) -> bool:
