@@ -29,11 +29,14 @@ LONGEST = 4.0
 PROBES = 8
 """Rays by which a point is found to lie open, or to be seen."""
 
-PLACES = np.array([[5, 5], [11, 2], [2, 11], [2, 2], [7, 7], [1, 7], [7, 1]]) / 15
-"""Points of a triangle, first and third barycentric coordinate: its middle, and more where that is not seen."""
+PLACES = np.array([[5, 5], [11, 2], [2, 11], [2, 2], [7, 7], [1, 7], [7, 1], [13, 1], [1, 13], [1, 1]]) / 15
+"""Points of a triangle, first and third barycentric coordinate: its middle, and more where that is not like the others."""
 
 SEEN = 0.75
 """Share of a point's rays that must show that it is seen from somewhere, for it to stand for its cell."""
+
+TYPICAL = 0.25
+"""Share of its rays by which a point may lie more or less open than its cell does on average, and stand for it."""
 
 BOLDER = 1.25
 """Growth of the cells' width while there are too many."""
@@ -100,30 +103,33 @@ def probes(normal: NDArray) -> NDArray[np.float32]:
     return np.stack([x * t + y * b + z * normal for x, y, z in along]).astype(np.float32)
 
 
-def _seen(scene: Scene, triangle: NDArray, barycentric: NDArray) -> NDArray[np.float64]:
-    """Share of the rays of some points that end on nothing or on the front of a triangle, on their better side: (P,).
+def _looked(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of the rays of some points, on both sides, those that end on nothing, a share of each side's: (P,). And by how many the
+    point is seen: those that end on nothing or on the front of a triangle, a share of the better side's: (P,).
 
     Within what is closed, as where one piece stands in another, all end on backs.
     """
-    point, result = scene.point(triangle, barycentric), np.zeros(len(triangle))
+    point, opened, seen = scene.point(triangle, barycentric), *np.zeros((2, len(triangle)))
     for side in (1, -1):
         normal = scene.geometric_normal(triangle) * np.float32(side)
         along = probes(normal).reshape(-1, 3)
         hits = scene.intersect(np.tile(point + np.float32(OFFSET) * normal, (PROBES, 1)), along)
         shown = ~hits.mask | ((scene.geometric_normal(hits.triangle) * along).sum(-1) < 0)
-        result = np.maximum(result, shown.reshape(PROBES, -1).mean(0))
-    return result
+        opened += (~hits.mask).reshape(PROBES, -1).mean(0)
+        seen = np.maximum(seen, shown.reshape(PROBES, -1).mean(0))
+    return opened, seen
 
 
-def _first_seen(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[NDArray, NDArray]:
-    """Of K points of each of C cells the first that is seen, or what is seen best: (C,), (C, 3). Args: (K, C), (K, C, 3)."""
-    best, seen = np.zeros(triangle.shape[1], np.int64), _seen(scene, triangle[0], barycentric[0])
-    for k in range(1, len(triangle)):
-        again = np.flatnonzero(seen < SEEN)
-        found = _seen(scene, triangle[k, again], barycentric[k, again])
-        better = found > seen[again]
-        best[again[better]], seen[again[better]] = k, found[better]
-    cell = np.arange(len(best))
+def _most_like(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[NDArray, NDArray]:
+    """Of K points of each of C cells one that lies as open as those that are seen do on average: (C,), (C, 3).
+
+    The first, unless it is far from that, as one is that stands in a crease or within another piece.
+    Args: (K, C), (K, C, 3).
+    """
+    opened, seen = (a.reshape(triangle.shape) for a in _looked(scene, triangle.ravel(), barycentric.reshape(-1, 3)))
+    told = seen >= np.minimum(SEEN, seen.max(0))
+    off = np.where(told, np.abs(opened - (opened * told).sum(0) / told.sum(0)), np.inf)
+    best, cell = np.where(off[0] < TYPICAL, 0, off.argmin(0)), np.arange(triangle.shape[1])
     return triangle[best, cell], barycentric[best, cell]
 
 
@@ -156,7 +162,7 @@ def _numbered(scene: Scene, cuts: NDArray, gathered: NDArray, groups: int, away:
         triangles.append(np.concatenate([whole[order[start + farther]], parts]).astype(np.int32))
         place = PLACES[np.concatenate([k // count, np.full(len(parts), k)])]
         places.append(_part_points(number, along, place).astype(np.float32))
-    triangle, barycentric = _first_seen(scene, np.stack(triangles), np.stack(places))
+    triangle, barycentric = _most_like(scene, np.stack(triangles), np.stack(places))
     return Cells(first.astype(np.int32), cuts.astype(np.int32), triangle, barycentric, width)
 
 

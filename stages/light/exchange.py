@@ -61,18 +61,34 @@ class Exchange:
         point. Args: material: (S, 5) albedo, roughness, metallic."""
         direct = np.ascontiguousarray(self.direct.reshape(len(self.direct), -1))
         dark = np.zeros_like(direct)
-        rays = self.ends.start, np.concatenate([from_steps(self.ends.towards), self.angle[None]])
-        assert np.diff(self.ends.start).max(initial=0) <= MOST
+        start, place = in_whole_lanes(self.ends.start)
+        assert np.diff(start).max(initial=0) <= MOST
+        spread = functools.partial(_spread, place, start[-1])
+        rays = start, spread(np.concatenate([from_steps(self.ends.towards), self.angle[None]]))
         shown = open_sky(self.ends, self.angle, self.sky)
-        seen = np.ascontiguousarray(shown.T)
+        seen = spread(shown.T)
         own = OwnLight(1, np.ascontiguousarray(material, np.float32), direct, dark, dark, *rays, seen)
         reflected = np.tile(reflectance(material), direct.shape[1] // 3)
         for _ in range(bounces - 1):
             more, brought = received(self.ends, self.weight, own, self.sky)
             light, before, sent = direct + more, own.light, reflected * own.before
-            seen = np.ascontiguousarray((shown + brought).T)
+            seen = spread((shown + brought).T)
             own = OwnLight(own.bounces + 1, own.material, light, before, sent, *rays, seen)
         return own
+
+
+def in_whole_lanes(start: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Where each side's rays begin if a side has whole vectors of them, and where there each ray is."""
+    count = np.diff(start)
+    begins = np.concatenate([[0], np.cumsum(-(-count // LANES) * LANES)]).astype(np.int32)
+    return begins, np.arange(start[-1]) + (begins[:-1] - start[:-1]).astype(np.int64).repeat(count)
+
+
+def _spread(place: NDArray[np.int64], count: int, values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Values of rays, one after the other (N, R), at their places among so many, and 0 between."""
+    result = np.zeros((len(values), count), np.float32)
+    result[:, place] = values
+    return result
 
 
 LEAST = 0.01

@@ -60,8 +60,9 @@ class OwnLight(NamedTuple):
     """Sides of cells under L environments. bounces: that a path may have made. material: (S, 5) albedo, roughness, metallic.
 
     light, before: (S, 3 L), what they receive, and that with one bounce less. sent: (S, 3 L), what they send with two less.
-    start: (S + 1,) where each side's rays begin, of R in all. around: (4, R), their directions and the solid angles that they
-    stand for, steradians. brought: (3 L, R), what each brings, with one bounce less.
+    start: (S + 1,) where each side's rays begin, of R in all, in whole vectors, the last of which may be filled up by zeros.
+    around: (4, R), their directions and the solid angles that they stand for, steradians. brought: (3 L, R), what each brings,
+    with one bounce less.
     """
 
     bounces: int

@@ -105,7 +105,7 @@ GLTF = Terms(
 )
 """E, A at every knot, B at every knot."""
 
-BOUNCED = replace(GLTF, shares=(0.16, 0.32, 0.16, 0.11, 0.11, 0.16, 0.16, 0.16, 0.1))
+BOUNCED = replace(GLTF, shares=(0.16, 0.32, 0.16, 0.11, 0.16, 0.21, 0.16, 0.16, 0.1))
 """The same where the object is seen in itself too: more rays of narrow lobes, which are followed from mirror to mirror."""
 
 BLENDER = Terms(
