@@ -68,6 +68,7 @@ RARE = {
 """Further names; most values are the means of the xkcd colour survey (Munroe 2010, CC0), some those of CSS."""
 
 SHADES = {
+    "pearl white": "#f2efe6",
     "oatmeal": "#d6c8ae", "biscuit": "#dcc49a", "mocha": "#6e4f3a", "latte": "#b99a76", "espresso": "#3c2a21",
     "cappuccino": "#a68868", "greige": "#b8ac9c", "putty": "#c2b6a0", "anthracite": "#33373b", "graphite": "#3d4043",
     "claret": "#6e1423", "merlot": "#561a24", "damson": "#4b2a40", 

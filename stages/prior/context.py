@@ -148,7 +148,7 @@ def _says_again(before: Phrase, phrase: Phrase, result: list[Phrase], number: in
         before.substance, before.colors = phrase.substance, phrase.colors or before.colors
         before.finish += phrase.finish
         _add(before.weather, phrase.weather)
-    elif len(result) > 1 and _again(result[0], phrase):
+    elif result and _again(result[0], phrase):
         result[0].finish += phrase.finish
         _add(result[0].weather, phrase.weather)
     else:

@@ -285,7 +285,7 @@ def _take(phrase: Phrase, token: Token, early: bool) -> None:
         phrase.region, phrase.where, phrase.placed = token.value, text, phrase.says_what
     elif kind == "thing" and not phrase.closed:
         phrase.thing, phrase.headed = text, bool(phrase.substance)  # the last of a run says what it is: "school bus"
-    elif kind == "name" and (phrase.substance or phrase.colors or _worn_part(phrase)) and not phrase.region:
+    elif kind == "name" and (phrase.substance or phrase.colors or phrase.animal or _worn_part(phrase)) and not phrase.region:
         phrase.part = text
     elif kind == "animal":
         phrase.animal = text

@@ -248,6 +248,10 @@ def in_pairs(phrases: list[Phrase]) -> list[Phrase]:
     phrases = _on_ground(phrases)
     for number in range(len(phrases) - 2, -1, -1):
         first, second = phrases[number], phrases[number + 1]
+        placed = first.where in PARTS and first.coats and any(map(is_hue, first.colors))
+        if number and placed and second.join.kind == "and" and second.color_only and not (second.region or second.part):
+            part = Phrase(first.join, region=first.region, where=first.where)
+            second.join, second.within, second.region = Join("with"), part, SHAPES["patches"]  # "painted yellow and black"
         if first.join.kind == second.join.kind == "half":
             first.region, first.where = Region("left", 0.5), "half"
         if number == 0 and _both_of(first, second):

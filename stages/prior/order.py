@@ -138,7 +138,7 @@ def _flanked(first: Phrase, over: list[Phrase]) -> Order:
 
 def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     """The body, where one is spoken of, is the base, and what was named first lies on top of it."""
-    whole = [_is_all(p) and p.says_what and not (gathering(p.substance) or p.thing or _is_gem(p)) for p in over]
+    whole = [_is_all(p) and p.says_what and not (gathering(p.substance) or p.thing or p.part or _is_gem(p)) for p in over]
     at = whole.index(True) if True in whole else None
     if at is None:
         return first, over

@@ -187,7 +187,8 @@ class Reading:
             _, marks, region = ANIMALS[phrase.animal]
             mark = color_of(phrase) if phrase.colors else triple(rgb(marks.split()[0]))
             marked = replace(beneath, color=mark, said=said_of(phrase))
-            if phrase.region and phrase.where and phrase.where not in SHAPES:  # "a rifle with a camouflage stock"
+            on_part = bool(phrase.where or phrase.part) and phrase.where not in SHAPES
+            if phrase.region and on_part:  # "a rifle with a camouflage stock"
                 return self._printed(phrase, beneath)
             return [Layer(marked, (region.mask(phrase.animal),))]
         mask = place_of(phrase).mask(phrase.where or phrase.part)

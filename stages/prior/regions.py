@@ -42,6 +42,8 @@ def whole_place_of(phrase: Phrase) -> Region:
         return Region("up", 0.4)  # "a cake with strawberries on top"
     if gathers and phrase.region and phrase.region.kind == "all":
         return gathers  # "ivy climbing the walls"
+    if phrase.region and phrase.region.kind == "all" and phrase.part:
+        return DETAILS  # "with a red letter on each side"
     if phrase.region and phrase.region.kind == "all" and phrase.substance and family_of(phrase) == "gem":
         return PARTS["central gem"]  # "a book with a gem on the cover"
     if phrase.region:

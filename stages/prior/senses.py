@@ -115,7 +115,7 @@ def _own_part(token: Token, before: list[Token]) -> Region | None:
     return places.get(token.text) if token.kind in ("substance", "thing", "color") and token.text in OUTSIDES else None
 
 
-OUTSIDES = ("flesh", "skin", "hide", "rind", "crust", "shell", "peel", "husk", "horn", "bell", "rose")
+OUTSIDES = ("flesh", "skin", "hide", "rind", "crust", "shell", "peel", "husk", "horn", "bell", "rose", "spine")
 """Names of stuffs that are parts of things, too."""
 
 
@@ -287,7 +287,7 @@ def _stands_before(ahead: list[Token], behind: list[Token]) -> bool:
 FOODS = frozenset(["bread", "cheese", "chocolate", "salt", "meat", "honeycomb", "honey"])
 """Looks of what is eaten."""
 
-HELD = FOODS | {"toxic waste", "nuclear waste", "slime", "fuel", "petrol", "gasoline",
+HELD = FOODS | {"hay", "toxic waste", "nuclear waste", "slime", "fuel", "petrol", "gasoline",
                 "grass", "sand", "fine sand", "soil", "coal", "charcoal", "snow", "ice", "ash", "dust", "gravel", "leaves",
                 "bark", "newspaper", "oil", "seashell", "jam", "ink", "water", "coffee beans", "acid", "rice", "red wine",
                 "sugar", "peanut butter", "marmalade", "soy sauce", "mayonnaise", "yogurt", "engine oil",
@@ -318,7 +318,7 @@ def _serves(token: Token, ahead: list[Token]) -> bool:
 
 
 VESSELS = ("bucket", "pail", "bin", "jar", "can", "bottle", "tank", "scuttle", "shaker", "dispenser", "mill", "grinder", "jug",
-           "tin", "drum", "barrel", "shovel", "cellar")  # fmt: skip
+           "tin", "drum", "barrel", "shovel", "cellar", "boots", "boot", "cart", "wagon")  # fmt: skip
 PLAITED = ("bark", "leaves", "grass", "seashell", "newspaper")
 """Things that are for what is named before them, and looks of what may be made of, too."""
 

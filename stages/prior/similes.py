@@ -59,6 +59,7 @@ SIMILES = (
     (r"\b(?:stone|acid)[- ]?washed (?=jeans|denim|jacket)", "faded "),
     (r"\b(basket|crate|box|sack|bag|bowl|bucket|barrel|cart|tray|plate|bunch|pile) of "
      r"(?:red|green|yellow|orange|ripe|fresh) (?=[a-z]+s\b)", r"\1 of "),
+    (r"\bmoth (?=holes)", ""),
     (r"\bon (?:the )?(?:north|south|east|west|shady|sunny|far|near|windward|lee|left or right)(?:ern)? side\b", "on one side"),
     (r"\b(cobweb|vine|lichen|barnacle)(?:bed|ed|d|by)\b", r"\1 covered"), (r"\bcandy[- ](?=striped)", ""),
     (r"^(?:an? )?((?:[a-z]+ )*?(?:stone|gem|jewel|diamond|ruby|emerald|sapphire|pearl|opal|amber|jade|crystal)s?) "
@@ -83,7 +84,8 @@ SIMILES = (
     (r"\bwhite-?washed (?=[a-z])", "white painted "),
     (r"\bcamouflage in ([a-z]+) (?:tones|colou?rs|shades)\b", r"\1 camouflage"),
     (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ ){0,3}paint\b)", "peeling "),
-    (r"\b(cracks|gaps|seams|grooves|joints|holes|veins) (?:filled|inlaid|repaired|sealed|packed|fixed|mended) (?:with|in) "
+    (r"\b(cracks|gaps|seams|grooves|joints|holes|veins|runes|letters|carvings) "
+     r"(?:filled|inlaid|repaired|sealed|packed|fixed|mended) (?:with|in) "
      r"([a-z ]+?)(?=$|[,.;]| and | on )", r"\2 \1"),
     (r"\b(?:multi-?colou?red|colou?rful)\b", "rainbow patches"),
     (r"\b(?:bright |in )?(?:the )?primary colou?rs\b", "in red, yellow and blue"),
