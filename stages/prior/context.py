@@ -120,6 +120,8 @@ def _takes_wear(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
         for painted in result:
             if painted.coats or painted.color_only:
                 _add(painted.weather, phrase.weather)
+    elif _cracks(phrase) and any(p.color_only for p in result):
+        _add(next(p for p in result if p.color_only).weather, phrase.weather)  # "a duck, green head, cracked paint"
     elif _wears(before, phrase):
         if phrase.coats and phrase.region and phrase.where in PARTS and phrase.region.kind not in ("edges", "crevices", "all"):
             whole = before if before.coats or before.color_only else result[0]
@@ -290,6 +292,12 @@ def _glazes(glaze: Phrase, before: Phrase) -> bool:
     whole = not glaze.region and (not before.region or before.join is FIRST)
     dyes = not before.colors and all(word in COLORS or family(word) == "gem" for word in glaze.colors if is_hue(word))
     return whole and (not glaze.colors or dyes)
+
+
+def _cracks(phrase: Phrase) -> bool:
+    """Whether a phrase only says of paint, of which no colour is said, that it is broken."""
+    plain = phrase.coats and family(phrase.substance) == "paint" and not (phrase.colors or phrase.region or phrase.shows)
+    return plain and phrase.join.kind in ("comma", "and") and any(word in BROKEN for word in phrase.weather)
 
 
 def _wears(before: Phrase, phrase: Phrase) -> bool:

@@ -40,7 +40,8 @@ def _painted(phrases: list[Phrase]) -> list[Phrase]:
 
 PAINTS = {
     "kintsugi": ("gold", [""]), "graffiti": ("spray paint", ["blue", "red", "yellow"]),
-    "puddles": ("water", [""]), "puddle": ("water", [""]),
+    "flames": ("paint", ["orange"]), "daisies": ("paint", ["white"]), "sunflowers": ("paint", ["yellow"]),
+    "poppies": ("paint", ["red"]), "hearts": ("paint", ["red"]), "puddles": ("water", [""]), "puddle": ("water", [""]),
     "sprinkles": ("glossy plastic", ["red", "yellow", "blue"]),
 }
 """Patterns that say of what they are, and of which colours where nobody says."""
@@ -54,7 +55,7 @@ def _paintings(phrase: Phrase, beside: list[Phrase]) -> list[Phrase]:
     if any(p.substance == stuff and p.join.kind == "inlay" for p in beside):
         return []  # "repaired with gold (kintsugi)"
     if any(map(is_hue, phrase.colors)):
-        return [replace(phrase, substance=stuff)]
+        return [phrase if stuff == "paint" else replace(phrase, substance=stuff)]
     sizes = [1 + 0.4 * k for k in range(len(colors))]
     regions = [phrase.region._replace(share=phrase.region.share / n, size=phrase.region.size * n) for n in sizes]
     joins = [phrase.join, *([Join("with")] * (len(colors) - 1))]

@@ -43,11 +43,13 @@ def resolved(found: list[Token]) -> list[Token]:
             continue  # "a tin biscuit box", "a tea bowl"
         if token.text == "frosted" and ahead and ahead[0].kind == "thing" and _of_growth(ahead[0]):
             token = Token("weather", "frosty", WEATHER["frosty"])  # "a frosted pine cone"
-        haired = token.kind == "thing" and result and ahead and ahead[0].text in HAIR
+        pelt = bool(ahead) and ahead[0].text == "rug"  # "a polar bear rug"
+        haired = token.kind == "thing" and ahead and (pelt or (result and ahead[0].text in HAIR))
         if haired and OBJECTS[token.text].made.split(" with ")[0].endswith("fur"):
             result += hues_of(token.text)
-            if ahead[0].kind == "part":
-                found[number + 1] = Token("substance", "bristles", KNOWN["bristles"])
+            if ahead[0].kind == "part" or pelt:
+                name = "fur" if pelt else "bristles"
+                found[number + 1] = Token("substance", name, KNOWN[name])
             continue  # "a brush of badger hair"
         if token.text in COLORS and token.kind in ("substance", "thing"):
             shaped = any(t.kind == "shape" or (t.kind == "part" and token.text not in KNOWN) for t in ahead)

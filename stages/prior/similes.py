@@ -60,6 +60,7 @@ SIMILES = (
     (r"\b(basket|crate|box|sack|bag|bowl|bucket|barrel|cart|tray|plate|bunch|pile) of "
      r"(?:red|green|yellow|orange|ripe|fresh) (?=[a-z]+s\b)", r"\1 of "),
     (r"\bmoth (?=holes)", ""),
+    (r"\blime[- ]wash(?:ed)?\b(?= (?:brick|stone))", "white"), (r"\blime[- ]wash(?:ed)?\b", "limewashed"),
     (r"\bon (?:the )?(?:north|south|east|west|shady|sunny|far|near|windward|lee|left or right)(?:ern)? side\b", "on one side"),
     (r"\b(cobweb|vine|lichen|barnacle)(?:bed|ed|d|by)\b", r"\1 covered"), (r"\bcandy[- ](?=striped)", ""),
     (r"^(?:an? )?((?:[a-z]+ )*?(?:stone|gem|jewel|diamond|ruby|emerald|sapphire|pearl|opal|amber|jade|crystal)s?) "

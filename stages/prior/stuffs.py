@@ -39,7 +39,7 @@ FAMILY_LOOKS = {
 
 GENERIC = frozenset(words(
     "wood, wooden, timber, fabric, cloth, textile, metal, metallic, stone, rock, ceramic, pottery, plastic, paint, painted, "
-    "leather, paper, veneer, wood veneer"
+    "flashing, leather, paper, veneer, wood veneer"
 ))  # fmt: skip
 """Names of whole families: another name before one of them says which ("teak wood")."""
 
