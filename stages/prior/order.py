@@ -20,6 +20,10 @@ def ordered(phrases: list[Phrase]) -> Order:
     for after in phrases[1:]:
         if after.join.kind == "below" and (after.coats or gathering(after.substance)):
             after.join = Join("over")  # "iron under peeling paint"
+    beneath = next((k for k, p in enumerate(phrases) if k and p.join.beneath and p.join.kind == "cover"), 0)
+    if beneath > 1 and all(p.join.kind == "and" for p in phrases[1:beneath]):
+        for phrase in phrases[1:beneath]:
+            phrase.join = phrases[beneath].join  # "a moss and fern covered log"
     base = 0
     while base + 1 < len(phrases) and phrases[base + 1].join.beneath and not _stands(phrases[base], phrases[base + 1]):
         base += 1
@@ -153,7 +157,7 @@ def _of_body(first: Phrase, over: list[Phrase]) -> Order:
     if alone or (first.substance in GENERIC and body.substance and family(first.substance) == family(body.substance)):
         return replace(body, thing=body.thing or first.thing, weather=[*first.weather, *body.weather]), others
     if not (first.region or gathering(first.substance) or first.substance in ROOFING):
-        first = replace(first, region=Region("above", 0.4))
+        first = replace(first, region=Region("badge", 0.5) if first.thing else Region("above", 0.4))
     return body, [first, *others]
 
 

@@ -275,7 +275,7 @@ class Reading:
         if beneath is not None and phrase.colors:  # of the same stuff
             kind = place_of(phrase).kind
             made_of = CORRODES.get(beneath.look.split(" ")[-1]) if beneath.metallic else ""
-            stained = kind in ("streaks", "patches", "crevices") and phrase.color_only
+            stained = (kind in ("streaks", "patches", "crevices") or phrase.where.startswith("on ")) and phrase.color_only
             if made_of == "verdigris" and stained and greenish(phrase):
                 return self._named("verdigris")  # "a copper still with green streaks"
             raw = family_of_look(beneath.look) in ("metal", "rust", "wood", "stone") and beneath.look not in ("straw", "wicker")

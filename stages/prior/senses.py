@@ -17,7 +17,8 @@ def resolved(found: list[Token]) -> list[Token]:
         if _depicts(token, result):
             while result[-1].kind != "thing" or any(t.kind == "thing" for t in result[:-1]):
                 result.pop()
-            result.pop()  # "a knight on horseback statue"
+            hues = [word for word in result.pop().text.split(" ") if word in COMMON]  # "a knight on horseback statue"
+            result += [Token("color", word) for word in hues]  # "a black cat statue"
         ahead = run_of(found[number + 1 :])
         if token.text == "stained" and result and _stained(result[-1], found[number + 1 :]):
             result[-1] = result[-1]._replace(kind="color", value=None)
@@ -127,7 +128,7 @@ def _depicts(token: Token, before: list[Token]) -> bool:
         return False
     at = next((k for k, t in enumerate(before) if t.kind == "thing"), len(before))
     named = (t.kind in ("thing", "unknown") or t.text in ("on", "with", "and", "of") for t in before[at:])
-    return len(before) > at + 1 and all(named)
+    return at < len(before) and all(named)
 
 
 YOUNG = ("puppy", "pup", "kitten", "cub", "foal", "calf", "lamb", "chick")

@@ -43,6 +43,8 @@ def kin(phrase: Phrase, usual: Phrase) -> bool:
     if not usual.substance or usual.substance == phrase.substance:
         return bool(usual.substance)
     pelt = KNOWN[usual.substance][0].look == KNOWN[phrase.substance][0].look in PELTS
+    if phrase.substance == "plush" and KNOWN[usual.substance][0].look in PELTS:
+        return True  # "a red panda plush"
     return family_of(usual) == family_of(phrase) != "stone" and (pelt or phrase.substance in GENERIC)
 
 
