@@ -9,7 +9,7 @@ from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import spread
 from stages.prior.phrases import FIRST, Phrase, family, is_hue
-from stages.prior.places import BAND, PARTS, PEELS, SHAPES, SHOWS, Region, gathering, parts_of
+from stages.prior.places import BAND, FADED, PARTS, PEELS, SHAPES, SHOWS, Region, gathering, parts_of
 from stages.prior.senses import FOODS
 from stages.prior.stuffs import GENERIC, KNOWN
 
@@ -122,6 +122,8 @@ def _takes_wear(before: Phrase, phrase: Phrase, result: list[Phrase]) -> bool:
                 _add(painted.weather, phrase.weather)
     elif _cracks(phrase) and any(p.color_only for p in result):
         _add(next(p for p in result if p.color_only).weather, phrase.weather)  # "a duck, green head, cracked paint"
+    elif _fades(phrase):
+        _add(result[0].weather, phrase.weather)  # "a gnome, faded paint"
     elif _wears(before, phrase):
         if phrase.coats and phrase.region and phrase.where in PARTS and phrase.region.kind not in ("edges", "crevices", "all"):
             whole = before if before.coats or before.color_only else result[0]
@@ -292,6 +294,12 @@ def _glazes(glaze: Phrase, before: Phrase) -> bool:
     whole = not glaze.region and (not before.region or before.join is FIRST)
     dyes = not before.colors and all(word in COLORS or family(word) == "gem" for word in glaze.colors if is_hue(word))
     return whole and (not glaze.colors or dyes)
+
+
+def _fades(phrase: Phrase) -> bool:
+    """Whether a phrase only says of paint, of which no colour is said, that it is faded or old."""
+    plain = phrase.coats and not (phrase.colors or phrase.region or phrase.shows)
+    return plain and phrase.join.kind == "comma" and bool(phrase.weather) and set(phrase.weather) <= FADED.keys()
 
 
 def _cracks(phrase: Phrase) -> bool:

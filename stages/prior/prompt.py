@@ -233,7 +233,8 @@ class Reading:
             drawn = STAIN.search(word) or weather.region.kind in ("veins", "scratches") or word in PEELS
             drawn = drawn and where.kind not in ("edges", "crevices", "details")
             stains = (weather.region.mask(word),) if drawn else ()
-            layers.append(Layer(coat, (replace(where, wear=1.0), *stains), weather.thickness, weather.strength))
+            place = (weather.region.mask(word),) if where.kind == "all" else (replace(where, wear=1.0), *stains)
+            layers.append(Layer(coat, place, weather.thickness, weather.strength))
         return layers
 
 

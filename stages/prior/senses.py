@@ -44,6 +44,10 @@ def resolved(found: list[Token]) -> list[Token]:
             continue  # "a tin biscuit box", "a tea bowl"
         if token.text == "frosted" and ahead and ahead[0].kind == "thing" and _of_growth(ahead[0]):
             token = Token("weather", "frosty", WEATHER["frosty"])  # "a frosted pine cone"
+        if token.text == "stained" and token.kind == "postfix" and not result:
+            token = Token("weather", "stained", WEATHER["stained"])  # "a stained wooden board"
+        if token.kind == "thing" and result and result[-1].kind == "thing" and _furs(token, result[-1]):
+            result[-1:] = hues_of(result[-1].text)  # "a snow leopard fur coat"
         pelt = bool(ahead) and ahead[0].text == "rug"  # "a polar bear rug"
         haired = token.kind == "thing" and ahead and (pelt or (result and ahead[0].text in HAIR))
         if haired and OBJECTS[token.text].made.split(" with ")[0].endswith("fur"):
@@ -139,6 +143,11 @@ def _of_growth(token: Token) -> bool:
     """Whether a thing is of what grows, on which frost is ice."""
     made = OBJECTS[token.text].made.split(" with ")[0].split(" ")[-1]
     return made in KNOWN and KNOWN[made][0].family in ("wood", "organic", "stone") and KNOWN[made][0].look not in FOODS
+
+
+def _furs(worn: Token, beast: Token) -> bool:
+    """Whether what is worn is of the fur of a beast."""
+    return "fur" in worn.text.split(" ") and OBJECTS[beast.text].made.split(" with ")[0].endswith("fur")
 
 
 def _is_food(token: Token) -> bool:

@@ -59,7 +59,8 @@ SIMILES = (
     (r"\b(?:stone|acid)[- ]?washed (?=jeans|denim|jacket)", "faded "),
     (r"\b(basket|crate|box|sack|bag|bowl|bucket|barrel|cart|tray|plate|bunch|pile) of "
      r"(?:red|green|yellow|orange|ripe|fresh) (?=[a-z]+s\b)", r"\1 of "),
-    (r"\bmoth (?=holes)", ""),
+    (r"\bmoth (?=holes)", ""), (r"\b(?:cat|dog|claw) scratch(?:es)?\b", "scratches"),
+    (r"\bwith (?:an? |some |a few |small )*(?:chips?|nicks?) (?:on|in|at|along|around) the ([a-z]+)\b", r"with a chipped \1"),
     (r"\blime[- ]wash(?:ed)?\b(?= (?:brick|stone))", "white"), (r"\blime[- ]wash(?:ed)?\b", "limewashed"),
     (r"\bon (?:the )?(?:north|south|east|west|shady|sunny|far|near|windward|lee|left or right)(?:ern)? side\b", "on one side"),
     (r"\b(cobweb|vine|lichen|barnacle)(?:bed|ed|d|by)\b", r"\1 covered"), (r"\bcandy[- ](?=striped)", ""),
