@@ -115,7 +115,7 @@ def sphere_survey() -> Survey:
     normal = np.stack([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z], 1).astype(np.float32)
     point, zero = np.float32(RADIUS) * normal, np.zeros(count, np.float32)
     order = np.random.default_rng(0).permutation(count)  # its first ones are evenly spread, too
-    shape = survey.convexity(point, normal)
+    shape = survey.convexity(point, normal, survey.neighbours(point))
     label = label_at(point[order])
     return Survey(point[order], normal[order], shape[order], zero, np.zeros(count, np.int32), label, WHOLE)
 
