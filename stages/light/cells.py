@@ -32,6 +32,9 @@ PROBES = 8
 PLACES = np.array([[5, 5], [11, 2], [2, 11], [2, 2], [7, 7], [1, 7], [7, 1], [13, 1], [1, 13], [1, 1]]) / 15
 """Points of a triangle, first and third barycentric coordinate: its middle, and more where that is not like the others."""
 
+FEW = 4
+"""Points of a cell by which it is judged whether all of it lies alike."""
+
 SEEN = 0.75
 """Share of a point's rays that must show that it is seen from somewhere, for it to stand for its cell."""
 
@@ -123,14 +126,23 @@ def _looked(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[NDAr
 def _most_like(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[NDArray, NDArray]:
     """Of K points of each of C cells one that lies as open as those that are seen do on average: (C,), (C, 3).
 
-    The first, unless it is far from that, as one is that stands in a crease or within another piece.
-    Args: (K, C), (K, C, 3).
+    The first, unless it is far from that, as one is that stands in a crease or within another piece. Where the first FEW are
+    alike, no more are asked. Args: (K, C), (K, C, 3).
     """
+    best = np.zeros(triangle.shape[1], np.int64)
+    off, seen = _off_average(scene, triangle[:FEW], barycentric[:FEW])
+    again = np.flatnonzero((seen < SEEN).any(0) | (off > TYPICAL).any(0))
+    off, _ = _off_average(scene, triangle[:, again], barycentric[:, again])
+    best[again] = np.where(off[0] < TYPICAL, 0, off.argmin(0))
+    cell = np.arange(len(best))
+    return triangle[best, cell], barycentric[best, cell]
+
+
+def _off_average(scene: Scene, triangle: NDArray, barycentric: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """How much more or less open points lie than those of their cell that are seen, infinitely where they are not; and seen."""
     opened, seen = (a.reshape(triangle.shape) for a in _looked(scene, triangle.ravel(), barycentric.reshape(-1, 3)))
     told = seen >= np.minimum(SEEN, seen.max(0))
-    off = np.where(told, np.abs(opened - (opened * told).sum(0) / told.sum(0)), np.inf)
-    best, cell = np.where(off[0] < TYPICAL, 0, off.argmin(0)), np.arange(triangle.shape[1])
-    return triangle[best, cell], barycentric[best, cell]
+    return np.where(told, np.abs(opened - (opened * told).sum(0) / told.sum(0)), np.inf), seen
 
 
 def _from_middle(centre: NDArray, area: NDArray, group: NDArray) -> NDArray[np.float64]:

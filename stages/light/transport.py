@@ -119,7 +119,7 @@ SEED_STEP = 0x5EED
 EVEN = 0.35
 """Share of the light rays that is not given out by demand."""
 
-MORE_LIGHT = 1.5
+MORE_LIGHT = 1.35
 """Light rays of a point with bounces, as a multiple of those without."""
 
 QUALITY = {"draft": Quality(19, 9), "standard": Quality(38, 18), "high": Quality(304, 144)}
