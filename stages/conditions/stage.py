@@ -33,6 +33,7 @@ from stages.core.artifact import (
     write_manifest,
 )
 from stages.core.errors import InputError, NumericalError, OutputError
+from stages.core.memory import kept
 from stages.core.naming import guess
 from stages.core.progress import Progress, silent
 from stages.core.schemas import BOUNCES, CAMERAS, CONDITIONS, PREP, SURVEY, VIEW_BOUNCES
@@ -124,7 +125,7 @@ def conditions(
         missing = [view for view in mine if not view_is_there(out, view, names, options)]
         made = len(missing)
         shown: dict[int, Future[list[NDArray]]] = {}
-        with ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
+        with kept(), ThreadPoolExecutor(1) as writer:  # a view is written while the next one is traced
             written: Future | None = writer.submit(save_survey, out, scene, label, request) if whole else None
             for i, view in enumerate(missing):
                 progress("views", len(mine) - made + i, len(mine))
