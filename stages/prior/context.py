@@ -1,6 +1,7 @@
 """What phrases of a prompt lend each other: a part its stuff, a coat what it peels off, a thing its finish."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 from stages.prior.colors import COLORS, LEANINGS
 from stages.prior.implied import WEARS, implied
@@ -8,7 +9,7 @@ from stages.prior.lexicon import PAINTED, Join
 from stages.prior.motifs import grounded, in_pairs
 from stages.prior.objects import OBJECTS
 from stages.prior.palettes import spread
-from stages.prior.phrases import FIRST, Phrase, family, is_hue
+from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
 from stages.prior.places import BAND, FADED, PARTS, PEELS, SHAPES, SHOWS, Region, gathering, parts_of
 from stages.prior.senses import FOODS
 from stages.prior.stuffs import GENERIC, KNOWN
@@ -22,6 +23,9 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
     for phrase in phrases:
         if phrase.join.kind == "half" and phrase.weather and not (phrase.says_what or phrase.region):
             phrase.region, phrase.where = Region("right", 0.5), "half"  # "pots, one side mossy"
+    for roof, walls in pairwise(phrases[1:]):
+        if roof.join.beneath and roof.thing in PARTS and walls.where in PARTS and not roof.region:
+            roof.region, roof.where, roof.thing = PARTS[roof.thing], roof.thing, ""  # "snow on a slate roof, stone walls"
     if phrases[0].substance in CLEAR and not phrases[0].colors and phrases[1:] and phrases[1].join.kind in ("over", "on"):
         phrases[1].finish += phrases[0].finish or ["glossy"]  # "varnish over oak"
         phrases = [replace(phrases[1], join=FIRST), *phrases[2:]]
@@ -55,7 +59,18 @@ def understood(phrases: list[Phrase]) -> list[Phrase]:
             if before and not phrase.within and _within(before, phrase):
                 phrase.within = before
             result.append(phrase)
-    return spread(in_pairs(_laid(result)))
+    return spread(in_pairs(_laid(_countershaded(result))))
+
+
+def _countershaded(phrases: list[Phrase]) -> list[Phrase]:
+    """A beast of which its upper side and its belly are told is like its upper side: "a dragon, black above, red belly"."""
+    whole, *rest = phrases
+    above = next((p for p in rest if p.where == "above" and p.says_what), None)
+    beneath = any(p.region and p.region.kind == "down" for p in rest)
+    if not (whole.thing and lives(whole.thing) and above and beneath) or whole.says_stuff or whole.region:
+        return phrases
+    like = replace(whole, substance=above.substance, colors=above.colors, finish=whole.finish + above.finish)
+    return [like, *(p for p in rest if p is not above)]
 
 
 def _is_paint(phrase: Phrase, before: Phrase | None) -> bool:

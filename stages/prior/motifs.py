@@ -7,7 +7,7 @@ from stages.prior.colors import COLORS
 from stages.prior.lexicon import Join
 from stages.prior.objects import OBJECTS
 from stages.prior.phrases import FIRST, Phrase, family, is_hue, lives
-from stages.prior.places import ANIMALS, PARTS, PRINTED, SHAPES, SHELLED, Region
+from stages.prior.places import ANIMALS, MADE, PARTS, PRINTED, SHAPES, SHELLED, Region
 from stages.prior.stuffs import KNOWN
 
 
@@ -183,7 +183,7 @@ def _marked(phrases: list[Phrase]) -> list[Phrase]:
         ground = replace(first, animal="", substance=coat, region=None, where="")
         marks = replace(first, join=Join("with"), colors=after.colors or [after.substance])
         return [ground, marks, *rest[1:]]  # "zebra print in pink and black"
-    elif first.animal and after.color_only and after.join.kind == "with" and after.where in SHAPES:
+    elif first.animal and after.color_only and after.join.kind == "with" and after.where in MARKS:
         colors = first.colors or [ANIMALS[first.animal][0]]  # "a brown cow with white patches"
         ground = replace(first, animal="", substance=first.substance or coat_of(first.animal, first.thing), colors=colors)
         return [ground, replace(after, animal=first.animal, region=None, where=""), *rest[1:]]
@@ -219,6 +219,9 @@ def _on_ground(phrases: list[Phrase]) -> list[Phrase]:
     laid = [replace(p, substance=p.substance or name, boards=ground.boards, thing=ground.thing) for p in (one, other)]
     return [*laid, *rest]
 
+
+MARKS = frozenset(SHAPES) - {part for part, _ in MADE}
+"""Shapes that are marks and nothing else: straps are bands, too, but of leather."""
 
 TWO_TONE = ("stripes", "bands", "checks", "zigzag", "gingham")
 """Kinds of patterns that two colours share between them."""

@@ -84,6 +84,7 @@ SIMILES = (
      r"(?=$|[,.;]| and | with )", ""),
     (r"\bwhite-?washed (?=brick|stone|rock)", "white "),
     (r"\bwhite-?washed (?=[a-z])", "white painted "),
+    (r"\brusty (streaks?|stains?|runs|drips|spots|patches|specks)\b", r"rust \1"),
     (r"\bcamouflage in ([a-z]+) (?:tones|colou?rs|shades)\b", r"\1 camouflage"),
     (r"\b(?:flakes|remnants|remains|scraps) of (?=(?:[a-z]+ ){0,3}paint\b)", "peeling "),
     (r"\b(cracks|gaps|seams|grooves|joints|holes|veins|runes|letters|carvings) "
