@@ -24,7 +24,7 @@ PROMPTS ?=
 JOBS   ?= jobs
 # what `make export` writes every asset of JOBS for
 FOR    ?= blender
-# folder below which `make parts` finds armchair.obj, vintage_fan.glb, babylon_shaderball.glb, spot.obj and bob_uv.obj
+# folder below which `make parts` and `make transfer` find armchair.obj, vintage_fan.glb, babylon_shaderball.glb, avocado.glb, spot.obj and bob_uv.obj
 ASSETS ?= assets
 # meshes that `make beside` lays beside Cycles and three.js, and what they are made of
 BESIDE ?= demo/urn.obj bench/egg.obj bench/drum.obj
@@ -42,7 +42,7 @@ OPTIONS = --with prep "$$PREP_OPTIONS" --with conditions "$$CONDITIONS_OPTIONS" 
 	--with distill "$$DISTILL_OPTIONS" --with bake "$$BAKE_OPTIONS"
 
 .DELETE_ON_ERROR:
-.PHONY: help setup demo test test-workflow test-cluster campaign pages poor hostile uvs parts lint asset batch scene export docs bench beside bounces clean
+.PHONY: help setup demo test test-workflow test-cluster campaign pages poor hostile uvs parts lint asset batch scene export transfer docs bench beside bounces clean
 
 help:  ## show this list
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -154,6 +154,9 @@ uvs: $(VENV)/.ready | $(CYCLES)  ## models laid out in seventeen ways: UVs kept 
 
 parts: $(VENV)/.ready  ## parts with prompts of their own on real models below ASSETS, held against what their words mean
 	OMP_NUM_THREADS=1 $(RUN)/python -m tests.parts_campaign --assets "$$ASSETS" -o parts
+
+transfer: $(VENV)/.ready  ## texture transfer of six models, three of them below ASSETS on its meshes (an hour)
+	OMP_NUM_THREADS=1 $(RUN)/python -m tests.transfer_campaign --assets "$$ASSETS" -o transfer
 
 lint: $(VENV)/.ready  ## ruff and mypy
 	$(RUN)/ruff check .
